@@ -1,0 +1,5 @@
+"""`python -m glshade`."""
+
+from glshade.cli import main
+
+main()

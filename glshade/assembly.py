@@ -1,0 +1,198 @@
+"""Assembly: a Scene with everything looked up: meshes loaded and made ready, transforms multiplied, materials and lights found.
+
+Both renderers start here. Nothing is rounded yet but the meshes, which are float32 from the start.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import ValidationError
+
+from glshade import mesh_file
+from glshade.brdfs import BRDFS, Brdf
+from glshade.camera import View
+from glshade.errors import SceneError
+from glshade.lights import LIGHTS, Light
+from glshade.mesh import Mesh, faceted, with_normals, with_tangents
+from glshade.scene import Normals, Object, Rate, Scene
+
+Array = NDArray[np.float64]
+
+
+# Up to here a camera that frames the scene looks at every vertex; beyond, at boxes, which takes no time and leaves more air.
+FRAMED_EXACTLY = 200_000
+
+
+@dataclass(frozen=True, eq=False)
+class Instance:
+    """One mesh in its place.
+
+    name: the object's, for messages. mesh: ready for its rate (faceted for flat), with tangents where they are asked for.
+    world_from_object (4, 4) float64, for positions relative to the mesh's own origin. back_faces: whether they are drawn.
+    lights: which of the assembly's reach it.
+    """
+
+    name: str
+    mesh: Mesh
+    world_from_object: Array
+    material: Brdf
+    rate: Rate
+    back_faces: bool
+    vertex_colours: bool
+    lights: tuple[int, ...]
+
+    @property
+    def mirrored(self) -> bool:
+        """Whether the transform turns counter-clockwise into clockwise."""
+        return bool(np.linalg.det(self.world_from_object[:3, :3]) < 0)
+
+
+@dataclass(frozen=True, eq=False)
+class Assembly:
+    """Instances in scene order, the lights (a default rig where the scene has none), and the view."""
+
+    instances: tuple[Instance, ...]
+    lights: tuple[Light, ...]
+    view: View
+
+
+def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
+    """Looks everything up. `shading` overrules every object's.
+
+    Errors: SceneError (AssetError) with every fault of every mesh, material and texture coordinate.
+    """
+    problems: list[str] = []
+    pieces: list[tuple[Object, str, Mesh, Array, Brdf]] = []
+    for index, item in enumerate(scene.objects):
+        try:
+            pieces.extend(_pieces(scene, item, item.name or f"objects[{index}]"))
+        except SceneError as error:
+            problems.extend(f"objects[{index}].mesh: {problem}" for problem in error.problems)
+    if problems:
+        raise SceneError(problems)
+    boxes = [_corners(mesh.bounds, world) for _, _, mesh, world, _ in pieces]
+    width, height = scene.film.size
+    points = boxes
+    if scene.camera.framing and sum(len(mesh.positions) for _, _, mesh, _, _ in pieces) <= FRAMED_EXACTLY:
+        points = [_placed(mesh.positions + mesh.origin, world) for _, _, mesh, world, _ in pieces]
+    view = scene.camera.view(np.concatenate(points), width / height)
+    lights = scene.lights if scene.lights is not None else rig(view)
+    instances = []
+    for (item, name, mesh, world, material), box in zip(pieces, boxes, strict=True):
+        chosen = tuple(
+            i
+            for i, light in enumerate(lights)
+            if (light.only is None or item.name in light.only) and light.intensity != 0 and any(light.colour)
+        )
+        ambient = any(lights[i].omnidirectional for i in chosen)
+        material = material.canonical(ambient)
+        rate = shading or item.shading
+        problems.extend(f"{name}: {problem}" for problem in _needs_uvs(mesh, material))
+        back_faces = _draws_back_faces(item, mesh, material, box, view)
+        tangents = BRDFS[material.brdf].anisotropic or material.normal_map is not None
+        ready = _ready(mesh, rate == "flat", item.normals, item.threshold, tangents)
+        local = world.copy()
+        local[:3, 3] += world[:3, :3] @ mesh.origin
+        colours = item.vertex_colours and mesh.colours is not None
+        instances.append(Instance(name, ready, local, material, rate, back_faces, colours, chosen))
+    if problems:
+        raise SceneError(problems)
+    return Assembly(tuple(instances), tuple(lights), view)
+
+
+def rig(view: View) -> tuple[Light, ...]:
+    """The lights of a scene that says nothing of light: a key over the viewer's left shoulder, a fill, a little ambient."""
+    right, up, backward = view.axes
+
+    def toward(x: float, y: float, z: float) -> tuple[float, ...]:
+        return tuple(float(c) for c in -(x * right + y * up + z * backward))
+
+    directional, ambient = LIGHTS["directional"], LIGHTS["ambient"]
+    return (
+        directional.model_validate({"name": "key", "direction": toward(-0.7, 0.9, 0.8), "intensity": 0.95}),
+        directional.model_validate({"name": "fill", "direction": toward(1.0, 0.1, 0.6), "intensity": 0.2}),
+        ambient.model_validate({"name": "ambient", "intensity": 0.08}),
+    )
+
+
+def _pieces(scene: Scene, item: Object, name: str) -> Iterator[tuple[Object, str, Mesh, Array, Brdf]]:
+    """(object, name, mesh, world_from_object, material): one for each part of its mesh file."""
+    world = _world(scene, item)
+    own = scene.materials[item.material] if isinstance(item.material, str) else item.material
+    if item.shape is not None:
+        yield item, name, item.shape.mesh(), world, own or DEFAULT_MATERIAL
+    elif isinstance(item.mesh, Mesh):
+        yield item, name, item.mesh, world, own or DEFAULT_MATERIAL
+    elif item.mesh is not None:
+        model = mesh_file.load(item.mesh)
+        for part in model.parts:
+            label = f"{name}/{part.name}" if len(model.parts) > 1 else name
+            yield item, label, part.mesh, world @ part.transform, own or _file_material(part, item.mesh)
+
+
+@lru_cache(maxsize=4096)
+def _file_material(part: mesh_file.Part, path: Path) -> Brdf:
+    if part.material is None:
+        return DEFAULT_MATERIAL
+    try:
+        return BRDFS[part.material["brdf"]].model_validate(part.material)
+    except ValidationError as error:
+        faults = error.errors(include_url=False)
+        raise SceneError(
+            [f"{path}: material of {part.name}: {'.'.join(map(str, e['loc']))}: {e['msg']}" for e in faults]
+        ) from None
+
+
+DEFAULT_MATERIAL: Brdf = BRDFS["phong"].model_validate({"kd": 0.6, "ks": 0.25, "exponent": 50.0})
+
+
+def _world(scene: Scene, item: Object) -> Array:
+    by_name = {other.name: other for other in scene.objects if other.name} if item.parent else {}
+    world = item.transform.array()
+    while item.parent is not None:
+        item = by_name[item.parent]
+        world = item.transform.array() @ world
+    return world
+
+
+def _corners(bounds: Array, world: Array) -> Array:
+    """(8, 3): the corners of the box, in world space."""
+    which = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)])
+    return _placed(bounds[which, np.arange(3)], world)
+
+
+def _placed(points: Array, world: Array) -> Array:
+    placed: Array = points @ world[:3, :3].T + world[:3, 3]
+    return placed
+
+
+def _draws_back_faces(item: Object, mesh: Mesh, material: Brdf, box: Array, view: View) -> bool:
+    """Culling loses nothing where the mesh is solid and seen from outside; else both sides are drawn."""
+    sides: Literal["auto", "front", "both"] = item.sides if item.sides != "auto" else material.sides
+    if sides != "auto":
+        return sides == "both"
+    outside = bool(view.depth(box).min() > view.near) or not view.perspective
+    return not (outside and material.alpha_mode == "opaque" and mesh.is_solid)
+
+
+def _needs_uvs(mesh: Mesh, material: Brdf) -> Iterator[str]:
+    if mesh.uvs is None:
+        for name in (*material.parameters(), "normal_map"):
+            if hasattr(getattr(material, name), "texture"):
+                yield f"its material's {name} is a texture, but its mesh has no texture coordinates"
+
+
+@lru_cache(maxsize=4096)
+def _ready(mesh: Mesh, flat: bool, normals: Normals, threshold: float, tangents: bool) -> Mesh:
+    """The mesh with the attributes that its instance needs; the same object for the same wishes."""
+    ready = mesh if flat and not tangents else with_normals(mesh, normals, threshold)
+    if tangents:
+        ready = with_tangents(ready)
+    return faceted(ready) if flat else ready

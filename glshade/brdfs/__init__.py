@@ -1,0 +1,129 @@
+"""The reflectance models: one module each, found by its presence, beside one GLSL file of the same name.
+
+A model's class is its entry in the scene file: parameters with default, range, unit and meaning. `brdf_cos` is its value in
+float64: f cos = BRDF times max(n.l, 0) [1/sr], 0 where n.l <= 0 or n.v <= 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
+
+from glshade.document import Document, Finite, Triple, fault
+from glshade.found import Found
+from glshade.texture import NormalMap, Texture
+
+Array = NDArray[np.float64]
+
+
+def _branch(value: Any) -> str:
+    return "texture-table" if isinstance(value, Mapping | Texture) else "value"
+
+
+# What a parameter may be: three numbers (one stands for three) or one number, or a texture.
+Colour = Annotated[Annotated[Triple, Tag("value")] | Annotated[Texture, Tag("texture-table")], Discriminator(_branch)]
+Scalar = Annotated[Annotated[Finite, Tag("value")] | Annotated[Texture, Tag("texture-table")], Discriminator(_branch)]
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """What a model declares of one parameter.
+
+    `low`, `high` bound it; `usual` is the range worth a slider; `same_as` names the parameter it equals when left out;
+    `lobe` is "ambient" where only ambient light asks for it; `base` marks the surface's own colour, which vertex colours
+    multiply and whose texture carries alpha.
+    """
+
+    description: str
+    low: float = 0.0
+    high: float | None = None
+    usual: tuple[float, float] = (0.0, 1.0)
+    unit: str = "1"
+    same_as: str | None = None
+    lobe: Literal["all", "ambient"] = "all"
+    base: bool = False
+
+
+def parameter(default: Any, declared: Parameter) -> Any:
+    """A pydantic field that carries its declaration."""
+    return Field(
+        default, description=f"{declared.description} [{declared.unit}]", json_schema_extra={"glshade": vars(declared)}
+    )
+
+
+class Brdf(Document):
+    """A material: a model's parameters, and what every material may say of its surface besides."""
+
+    brdf: str
+    alpha: Annotated[float, Field(ge=0, le=1)] = Field(1.0, description="opacity; the base texture's alpha multiplies it")
+    alpha_mode: Literal["opaque", "mask", "blend"] = Field(
+        "opaque",
+        description="opaque: alpha is ignored; mask: cut out below alpha_cutoff; blend: drawn back to front (approximate)",
+    )
+    alpha_cutoff: Annotated[float, Field(ge=0, le=1)] = Field(0.5, description="mask: what is less opaque is cut out")
+    normal_map: NormalMap | None = Field(None, description="tangent-space normals")
+    sides: Literal["auto", "front", "both"] = Field("auto", description="sides of the surface; an object may say otherwise")
+
+    # Whether the model looks at the tangent directions.
+    anisotropic: ClassVar[bool] = False
+    # Whether its value depends on the viewer (beyond v being above the horizon).
+    source: ClassVar[str] = ""
+
+    @classmethod
+    def parameters(cls) -> dict[str, Parameter]:
+        """name -> declaration, in the order of the GLSL struct."""
+        found = {}
+        for name, field in cls.model_fields.items():
+            extra = field.json_schema_extra
+            if isinstance(extra, dict) and "glshade" in extra:
+                found[name] = Parameter(**extra["glshade"])  # type: ignore[arg-type]
+        return found
+
+    @classmethod
+    def is_colour(cls, name: str) -> bool:
+        """Whether the parameter has three channels."""
+        return "Colour" in str(cls.__annotations__[name])
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _within(cls, value: Any, info: ValidationInfo) -> Any:
+        declared = cls.parameters().get(info.field_name or "")
+        if declared is None or value is None or isinstance(value, Texture):
+            return value
+        numbers = value if isinstance(value, tuple) else (value,)
+        if min(numbers) < declared.low:
+            raise fault(f"must be at least {declared.low:g}, not {min(numbers):g}")
+        if declared.high is not None and max(numbers) > declared.high:
+            raise fault(f"must be at most {declared.high:g}, not {max(numbers):g}")
+        return value
+
+    def canonical(self, ambient: bool) -> Brdf:
+        """The simplest model with the same value: lobes of weight zero drop out. `ambient`: whether ambient light counts."""
+        return self
+
+    @staticmethod
+    def brdf_cos(m: Any, l: Array, v: Array) -> Array:
+        """f cos [1/sr], (..., 3), in float64; `m` has the parameters as arrays, colours (..., 3) and scalars (...).
+
+        l, v (..., 3): unit directions in the local frame, z along the normal, x along the tangent.
+        """
+        raise NotImplementedError
+
+    @staticmethod
+    def ambient_reflectance(m: Any) -> Array:
+        """(..., 3): what the model reflects of ambient light."""
+        raise NotImplementedError
+
+
+def above_horizon(l: Array, v: Array, value: Array) -> Array:
+    """`value` (..., 3) where both directions are above the horizon, else 0: the contract of every model."""
+    return np.where(((l[..., 2] > 0) & (v[..., 2] > 0))[..., None], value, 0.0)
+
+
+BRDFS: Found[Brdf] = Found("glshade.brdfs", Path(__file__).parent)

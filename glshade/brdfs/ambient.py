@@ -1,0 +1,26 @@
+"""ambient: reflects ambient light alone."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from glshade.brdfs import Array, Brdf, Colour, Parameter, parameter
+
+
+class Ambient(Brdf):
+    """ka times the ambient light: one constant colour, whatever else shines. f cos is 0."""
+
+    source: ClassVar[str] = "lecture slides 12, 23"
+
+    brdf: Literal["ambient"] = "ambient"
+    ka: Colour = parameter((0.8, 0.8, 0.8), Parameter("ambient reflectance", lobe="ambient", base=True))
+
+    @staticmethod
+    def brdf_cos(m: Any, l: Array, v: Array) -> Array:
+        return np.zeros(np.broadcast_shapes(np.shape(m.ka), l.shape, v.shape))
+
+    @staticmethod
+    def ambient_reflectance(m: Any) -> Array:
+        return m.ka  # type: ignore[no-any-return]

@@ -1,0 +1,51 @@
+"""ashikhmin_shirley: an anisotropic Phong model with Fresnel and a diffuse term that keeps the energy."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from glshade.brdfs import Array, Brdf, Colour, Parameter, Scalar, above_horizon, parameter
+from glshade.brdfs.blinn_phong import half_vector
+
+
+class AshikhminShirley(Brdf):
+    """Anisotropic specular with Schlick's Fresnel over an energy-preserving diffuse term. Reflects ambient light with kd.
+
+    Lecture slide 42 writes (n.u)^2 and (n.v)^2 in the exponent, which are 0; the paper, and this, have (h.u)^2 and (h.v)^2.
+    """
+
+    source: ClassVar[str] = "Ashikhmin and Shirley 2000, eqs. 1-5; lecture slides 40-46"
+    anisotropic: ClassVar[bool] = True
+
+    brdf: Literal["ashikhmin_shirley"] = "ashikhmin_shirley"
+    kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("diffuse reflectance", high=1.0, base=True))
+    ks: Colour = parameter((0.05, 0.05, 0.05), Parameter("specular reflectance at normal incidence", high=1.0))
+    pu: Scalar = parameter(100.0, Parameter("narrowness of the lobe along the tangent", high=1e8, usual=(1.0, 10000.0)))
+    pv: Scalar = parameter(100.0, Parameter("narrowness of the lobe along the bitangent", high=1e8, usual=(1.0, 10000.0)))
+
+    @staticmethod
+    def brdf_cos(m: Any, l: Array, v: Array) -> Array:
+        h, length2 = half_vector(l, v)
+        NoL, NoV, NoH = l[..., 2], v[..., 2], h[..., 2]
+        LoH = np.clip(np.sum(l * h, axis=-1), 0.0, 1.0)
+        sin2 = h[..., 0] ** 2 + h[..., 1] ** 2
+        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+            # log(n.h) / sin^2, by its limit -1/2 at h = n.
+            log_ratio = np.where(
+                sin2 < 0.5, np.where(sin2 > 0, np.log1p(-np.minimum(sin2, 0.5)) / (2 * sin2), -0.5), np.log(NoH) / sin2
+            )
+            lobe = np.exp((m.pu * h[..., 0] ** 2 + m.pv * h[..., 1] ** 2) * log_ratio)
+            norm = np.sqrt((m.pu + 1) * (m.pv + 1)) / (8 * math.pi)
+            scale = norm * lobe * NoL / (LoH * np.maximum(NoL, NoV))
+        fresnel = m.ks + (1 - m.ks) * ((1 - LoH) ** 5)[..., None]
+        specular = np.where((length2 > 1e-12)[..., None], fresnel * scale[..., None], 0.0)
+        rise = (1 - (1 - NoL / 2) ** 5) * (1 - (1 - NoV / 2) ** 5) * NoL
+        diffuse = 28 / (23 * math.pi) * m.kd * (1 - m.ks) * rise[..., None]
+        return above_horizon(l, v, diffuse + specular)
+
+    @staticmethod
+    def ambient_reflectance(m: Any) -> Array:
+        return m.kd  # type: ignore[no-any-return]

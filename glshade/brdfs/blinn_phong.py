@@ -1,0 +1,46 @@
+"""blinn_phong: the half-angle variant of phong."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from glshade.brdfs import Array, Brdf, Colour, Parameter, Scalar, above_horizon, parameter
+from glshade.brdfs.phong import power_of_cosine, without_lobe
+
+
+class BlinnPhong(Brdf):
+    """(kd n.l + ks max(n.h, 0)^exponent) / pi, h = (l + v)/|l + v|. Its lobe is wider than phong's at the same exponent.
+
+    Where l = -v there is no half vector, and no specular light. Reflects ambient light with ka.
+    """
+
+    source: ClassVar[str] = "Blinn 1977; lecture slide 20"
+
+    brdf: Literal["blinn_phong"] = "blinn_phong"
+    kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance", base=True))
+    ks: Colour = parameter((0.2, 0.2, 0.2), Parameter("specular strength at the lobe's centre"))
+    exponent: Scalar = parameter(128.0, Parameter("narrowness of the lobe, p", high=1e8, usual=(1.0, 1000.0)))
+    ka: Colour | None = parameter(None, Parameter("ambient reflectance; left out: kd", same_as="kd", lobe="ambient"))
+
+    def canonical(self, ambient: bool) -> Brdf:
+        return without_lobe(self, ambient)
+
+    @staticmethod
+    def brdf_cos(m: Any, l: Array, v: Array) -> Array:
+        h, length2 = half_vector(l, v)
+        lobe = np.where(length2 > 1e-12, power_of_cosine(np.array([0.0, 0.0, 1.0]), h, m.exponent), 0.0)
+        return above_horizon(l, v, (m.kd * l[..., 2:] + m.ks * lobe[..., None]) / math.pi)
+
+    @staticmethod
+    def ambient_reflectance(m: Any) -> Array:
+        return m.ka  # type: ignore[no-any-return]
+
+
+def half_vector(l: Array, v: Array) -> tuple[Array, Array]:
+    """h (..., 3), unit, and |l + v|^2 (...). Below 1e-12 (l = -v to float32 rounding) h is not to be used."""
+    H = l + v
+    length2 = np.sum(H * H, axis=-1)
+    return H / np.sqrt(np.maximum(length2, 1e-12))[..., None], length2

@@ -1,0 +1,25 @@
+"""lambert: ideal diffuse."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal
+
+from glshade.brdfs import Array, Brdf, Colour, Parameter, above_horizon, parameter
+
+
+class Lambert(Brdf):
+    """kd/pi cos. One-sided: light from behind gives 0, never its absolute value. Reflects ambient light with kd."""
+
+    source: ClassVar[str] = "Lambert 1760; lecture slides 13-15"
+
+    brdf: Literal["lambert"] = "lambert"
+    kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance (albedo)", base=True))
+
+    @staticmethod
+    def brdf_cos(m: Any, l: Array, v: Array) -> Array:
+        return above_horizon(l, v, m.kd * l[..., 2:] / math.pi)
+
+    @staticmethod
+    def ambient_reflectance(m: Any) -> Array:
+        return m.kd  # type: ignore[no-any-return]

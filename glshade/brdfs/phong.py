@@ -1,0 +1,58 @@
+"""phong: ambient, diffuse and a specular lobe about the mirror direction."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+
+from glshade.brdfs import Array, Brdf, Colour, Parameter, Scalar, above_horizon, parameter
+from glshade.brdfs.lambert import Lambert
+
+
+class Phong(Brdf):
+    """(kd n.l + ks max(r.v, 0)^exponent) / pi, r = 2 (n.l) n - l. Made up, not reciprocal. Reflects ambient light with ka.
+
+    Slides 18 and 24 do not gate the lobe by n.l, so that light from behind could leak through r.v > 0; here it is 0.
+    """
+
+    source: ClassVar[str] = "Phong 1975; lecture slides 12, 17-24"
+
+    brdf: Literal["phong"] = "phong"
+    kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance", base=True))
+    ks: Colour = parameter((0.2, 0.2, 0.2), Parameter("specular strength at the lobe's centre"))
+    exponent: Scalar = parameter(32.0, Parameter("narrowness of the lobe, p", high=1e8, usual=(1.0, 1000.0)))
+    ka: Colour | None = parameter(None, Parameter("ambient reflectance; left out: kd", same_as="kd", lobe="ambient"))
+
+    def canonical(self, ambient: bool) -> Brdf:
+        return without_lobe(self, ambient)
+
+    @staticmethod
+    def brdf_cos(m: Any, l: Array, v: Array) -> Array:
+        # In the local frame the mirror direction is l turned half round the normal.
+        r = l * np.array([-1.0, -1.0, 1.0])
+        lobe = power_of_cosine(r, v, m.exponent)
+        return above_horizon(l, v, (m.kd * l[..., 2:] + m.ks * lobe[..., None]) / math.pi)
+
+    @staticmethod
+    def ambient_reflectance(m: Any) -> Array:
+        return m.ka  # type: ignore[no-any-return]
+
+
+def without_lobe(material: Any, ambient: bool) -> Brdf:
+    """Lambert in place of a phong or blinn_phong whose ks is zero, unless ambient light would show a ka of its own."""
+    if material.ks == (0.0, 0.0, 0.0) and not (ambient and material.ka not in (None, material.kd)):
+        surface = {name: getattr(material, name) for name in Brdf.model_fields if name != "brdf"}
+        return Lambert.model_construct(brdf="lambert", kd=material.kd, **surface)
+    return material  # type: ignore[no-any-return]
+
+
+def power_of_cosine(a: Array, b: Array, p: Array) -> Array:
+    """max(a.b, 0)^p for unit vectors a, b (..., 3); 0^0 counts as 0, because a lobe ends at its horizon."""
+    c = np.einsum("...i,...i->...", a, b)
+    # Near 1 the cosine has lost its digits even in float64 (an error of p * 1e-16); 1 - a.b = |a - b|^2 / 2 has not.
+    s = 0.5 * np.sum((a - b) ** 2, axis=-1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        log_c = np.where(s < 0.5, np.log1p(-np.minimum(s, 0.5)), np.log(np.maximum(c, 1e-300)))
+    return np.where(c > 0, np.exp(p * log_c), 0.0)

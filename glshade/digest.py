@@ -1,0 +1,29 @@
+"""Digest: a scene's content in 64 letters. It does not depend on where files lie or what they are called."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from glshade.mesh import Mesh
+from glshade.scene import Scene
+
+
+def digest(scene: Scene) -> str:
+    """SHA-256 of everything that the scene says, files by their content."""
+
+    def content(value: Any) -> Any:
+        if isinstance(value, Path):
+            return hashlib.sha256(value.read_bytes()).hexdigest()
+        if isinstance(value, Mesh):
+            return value.digest
+        if isinstance(value, dict):
+            return {key: content(item) for key, item in value.items()}
+        if isinstance(value, tuple | list):
+            return [content(item) for item in value]
+        return value
+
+    text = json.dumps(content(scene.model_dump()), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,166 @@
+"""Document: what every part of a scene file is. Frozen pydantic models that report all their faults at once.
+
+pydantic's own messages speak to programmers; these speak to the author of a scene: what is allowed, and the nearest name.
+"""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    ModelWrapValidatorHandler,
+    ValidationError,
+    ValidationInfo,
+    model_validator,
+)
+from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
+
+# Internal union branches that pydantic puts in the path of an error; the author of a scene never wrote them.
+BRANCHES = frozenset({"value", "texture-table", "one", "pair", "shorthand", "table"})
+
+
+def nearest(name: object, names: Iterable[str]) -> str:
+    """`; did you mean "x"?` for a slip of the pen, else the names that are allowed."""
+    names = sorted(names)
+    close = difflib.get_close_matches(str(name), names, n=1)
+    return f'; did you mean "{close[0]}"?' if close else "; allowed: " + (", ".join(names) or "none")
+
+
+def fault(message: str) -> PydanticCustomError:
+    """An error with exactly this message: braces are doubled, because pydantic formats the template."""
+    return PydanticCustomError("scene", message.replace("{", "{{").replace("}", "}}"))
+
+
+def _speak(error: Any, fields: Iterable[str]) -> str:
+    kind, context = error["type"], error.get("ctx", {})
+    given = error["input"]
+    if kind == "extra_forbidden":
+        return "unknown key" + nearest(error["loc"][-1], fields)
+    if kind == "missing":
+        return "is required"
+    if kind == "literal_error":
+        return f"{given!r} is not one of {context['expected']}"
+    if kind == "finite_number":
+        return f"{given!r} is not a finite number"
+    if kind in {"value_error", "assertion_error"}:
+        return str(context.get("error", error["msg"]))
+    message = str(error["msg"]).replace("Input should be", "must be")
+    shown = repr(given)
+    return message if len(shown) > 40 or kind == "scene" else f"{message}, not {shown}"
+
+
+class Document(BaseModel):
+    """A table of the scene file: unknown keys are faults, values are frozen, numbers are finite."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
+
+    @model_validator(mode="wrap")
+    @classmethod
+    def _every_fault(cls, data: Any, handler: ModelWrapValidatorHandler[Any]) -> Any:
+        faults: list[InitErrorDetails] = []
+        document = None
+        try:
+            document = handler(data)
+        except ValidationError as error:
+            names = [field.alias or name for name, field in cls.model_fields.items()]
+            for detail in error.errors(include_url=False):
+                place = tuple(part for part in detail["loc"] if part not in BRANCHES)
+                faults.append(InitErrorDetails(type=fault(_speak(detail, names)), loc=place, input=detail["input"]))
+        for loc, message in cls.cross_faults(data):
+            faults.append(InitErrorDetails(type=fault(message), loc=loc, input=data))
+        if faults:
+            raise ValidationError.from_exception_data(cls.__name__, faults)
+        return document
+
+    @classmethod
+    def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
+        """Faults between keys, as (place, message); looked for even where single keys are at fault."""
+        return ()
+
+
+class Chosen:
+    """Annotates a field whose model is chosen by one key: `brdf = "phong"`, `type = "spot"`.
+
+    `models` maps names to classes and may load them on demand. A bare string stands for the model with its defaults
+    where `shorthand` is set.
+    """
+
+    def __init__(
+        self, models: Mapping[str, type[Document]], key: str, default: str | None = None, shorthand: bool = False
+    ) -> None:
+        self.models, self.key, self.default, self.shorthand = models, key, default, shorthand
+
+    def _choose(self, data: Any, info: core_schema.ValidationInfo) -> Document:
+        if isinstance(data, Document):
+            return data
+        if self.shorthand and isinstance(data, str):
+            data = {self.key: data}
+        if not isinstance(data, Mapping):
+            raise fault(f"must be a table with the key {self.key!r}, not {data!r}")
+        name = data.get(self.key, self.default)
+        if name is None:
+            raise fault(f"lacks the key {self.key!r}" + nearest("", self.models))
+        if not isinstance(name, str) or name not in self.models:
+            raise fault(f"unknown {self.key} {name!r}" + nearest(name, self.models))
+        return self.models[name].model_validate({**data, self.key: name}, context=info.context)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.with_info_plain_validator_function(
+            self._choose,
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                lambda document: document.model_dump(mode="json"), when_used="json"
+            ),
+        )
+
+    def __get_pydantic_json_schema__(self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        choices = [handler(model.__pydantic_core_schema__) for model in self.models.values()]
+        if self.shorthand:
+            choices.append({"enum": list(self.models)})
+        return {"anyOf": choices}
+
+
+def _triple(value: Any) -> Any:
+    if isinstance(value, int | float) and not isinstance(value, bool):
+        return (value,) * 3
+    if isinstance(value, str | bool) or not hasattr(value, "__len__") or len(value) != 3:
+        raise fault(f"must be three numbers, or one that stands for three, not {value!r}")
+    return tuple(value)
+
+
+def _resolve(path: Path, info: ValidationInfo) -> Path:
+    folder = (info.context or {}).get("folder")
+    path = path.expanduser()
+    path = path if path.is_absolute() or folder is None else Path(folder) / path
+    if not path.exists():
+        raise fault(f"{path} does not exist")
+    if path.is_dir():
+        raise fault(f"{path} is a folder, not a file")
+    return path
+
+
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Vector3 = tuple[Finite, Finite, Finite]
+# One number stands for three equal ones.
+Triple = Annotated[Vector3, BeforeValidator(_triple)]
+# A file that exists; relative paths start at the folder of the scene file.
+File = Annotated[Path, AfterValidator(_resolve)]
+
+
+def non_zero(value: Vector3) -> Vector3:
+    """Refuses the zero vector, which has no direction."""
+    if not any(value):
+        raise fault("must not be the zero vector: it has no direction")
+    return value
+
+
+Direction = Annotated[Vector3, AfterValidator(non_zero)]

@@ -1,0 +1,1 @@
+"""The only rooms that speak to OpenGL: context, program, vertices, textures, frame, renderer."""

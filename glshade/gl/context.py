@@ -1,0 +1,166 @@
+"""Context: an OpenGL context without a window, and the one call that moderngl does not wrap.
+
+On Linux through EGL (`libEGL.so.1` by its versioned name: machines without development packages have no other). Elsewhere
+`auto` falls back to moderngl's own standalone context.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import moderngl
+
+from glshade.errors import ContextError
+
+Backend = Literal["auto", "egl", "standalone"]
+BACKENDS: tuple[Backend, ...] = ("auto", "egl", "standalone")
+LIBEGL = "libEGL.so.1"
+REQUIRED_VERSION = 330
+
+# Khronos' registry values (gl.xml, egl.xml).
+GL_LOWER_LEFT, GL_ZERO_TO_ONE = 0x8CA1, 0x935F
+GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T = 0x0DE1, 0x2802, 0x2803
+EGL_VENDOR, EGL_VERSION, EGL_EXTENSIONS = 0x3053, 0x3054, 0x3055
+EGL_PLATFORM_DEVICE_EXT = 0x313F
+
+ADVICE = "install a driver (Debian, Ubuntu: apt install libegl1 libgl1-mesa-dri), then see `glshade doctor`"
+
+
+@dataclass(frozen=True)
+class Device:
+    """One of EGL's devices; index is what `--device` takes."""
+
+    index: int
+    vendor: str
+    version: str
+    extensions: tuple[str, ...]
+
+    @property
+    def is_software(self) -> bool:
+        """Whether the device is the CPU."""
+        return "EGL_MESA_device_software" in self.extensions
+
+
+class Context:
+    """An OpenGL context, made current.
+
+    gl: moderngl's. zero_to_one: whether clip z runs from 0 to 1, which reversed float depth needs to be worth its name.
+    """
+
+    def __init__(self, gl: moderngl.Context, backend: str, procedure: Callable[[str], int | None]) -> None:
+        self.gl, self.backend = gl, backend
+        self._procedure = procedure
+        clip_control = self.procedure("glClipControl", None, ctypes.c_uint, ctypes.c_uint)
+        self.zero_to_one = clip_control is not None and (gl.version_code >= 450 or "GL_ARB_clip_control" in gl.extensions)
+        if self.zero_to_one and clip_control is not None:
+            clip_control(GL_LOWER_LEFT, GL_ZERO_TO_ONE)
+
+    @property
+    def renderer(self) -> str:
+        """GL_RENDERER."""
+        return str(self.gl.info["GL_RENDERER"])
+
+    @property
+    def version(self) -> str:
+        """GL_VERSION."""
+        return str(self.gl.info["GL_VERSION"])
+
+    @property
+    def largest_side(self) -> int:
+        """The largest picture that the driver draws in one piece [pixels]."""
+        info = self.gl.info
+        return int(min(info["GL_MAX_TEXTURE_SIZE"], info["GL_MAX_RENDERBUFFER_SIZE"], *info["GL_MAX_VIEWPORT_DIMS"]))
+
+    def procedure(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any] | None:
+        """A GL function that moderngl does not wrap; None where the driver has none."""
+        address = self._procedure(name)
+        return ctypes.CFUNCTYPE(result, *arguments)(address) if address else None
+
+    def release(self) -> None:
+        """Gives everything back to the driver."""
+        self.gl.release()
+
+
+def open_context(backend: Backend = "auto", device: int | None = None) -> Context:
+    """A new context on the backend and EGL device.
+
+    Errors: ContextError with what failed and what to do.
+    """
+    if backend not in BACKENDS:
+        raise ContextError(f"unknown backend {backend!r}; allowed: {', '.join(BACKENDS)}")
+    if backend == "egl" or (backend == "auto" and sys.platform.startswith("linux")):
+        return _open_egl(device)
+    if device is not None:
+        raise ContextError("only EGL has devices to choose from; leave --device out")
+    try:
+        gl = moderngl.create_context(standalone=True, require=REQUIRED_VERSION)
+    except Exception as error:
+        raise ContextError(f"no OpenGL {REQUIRED_VERSION / 100:.1f} context: {error}; {ADVICE}") from None
+    return Context(gl, "standalone", lambda name: None)
+
+
+def _open_egl(device: int | None) -> Context:
+    egl = load_egl()
+    # glcontext wants a libGL to look symbols up in; EGL's own library serves, and bare machines have no libGL.
+    options: dict[str, Any] = {"backend": "egl", "libegl": LIBEGL, "libgl": LIBEGL, "require": REQUIRED_VERSION}
+    if device is not None:
+        options["device_index"] = device
+    try:
+        gl = moderngl.create_context(standalone=True, **options)
+    except Exception as error:
+        count = len(devices())
+        if device is not None and not 0 <= device < count:
+            raise ContextError(f"there is no EGL device {device}: `glshade devices` lists {count}") from None
+        raise ContextError(f"EGL gives no OpenGL {REQUIRED_VERSION / 100:.1f} context ({error}); {ADVICE}") from None
+
+    def procedure(name: str) -> int | None:
+        egl.eglGetProcAddress.restype = ctypes.c_void_p
+        address: int | None = egl.eglGetProcAddress(name.encode())
+        return address
+
+    return Context(gl, "egl", procedure)
+
+
+def load_egl() -> ctypes.CDLL:
+    """The EGL library. Errors: ContextError where it is missing."""
+    try:
+        return ctypes.CDLL(LIBEGL)
+    except OSError as error:
+        raise ContextError(f"{LIBEGL} cannot be loaded ({error}); {ADVICE}") from None
+
+
+def devices() -> list[Device]:
+    """EGL's devices in its own order. Errors: ContextError without EGL or without its device extensions."""
+    egl = load_egl()
+    egl.eglGetProcAddress.restype = ctypes.c_void_p
+    egl.eglQueryString.restype = ctypes.c_char_p
+
+    def function(name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
+        address = egl.eglGetProcAddress(name.encode())
+        if not address:
+            raise ContextError(f"{LIBEGL} has no {name}: it cannot list devices; leave --device out")
+        return ctypes.CFUNCTYPE(result, *arguments)(address)
+
+    pointer, integer = ctypes.c_void_p, ctypes.c_int
+    query = function("eglQueryDevicesEXT", ctypes.c_uint, integer, ctypes.POINTER(pointer), ctypes.POINTER(integer))
+    text = function("eglQueryDeviceStringEXT", ctypes.c_char_p, pointer, integer)
+    display_of = function("eglGetPlatformDisplayEXT", pointer, ctypes.c_uint, pointer, ctypes.POINTER(integer))
+    found = (pointer * 64)()
+    count = integer()
+    if not query(len(found), found, ctypes.byref(count)):
+        raise ContextError(f"{LIBEGL} cannot list its devices; {ADVICE}")
+    result = []
+    for index in range(count.value):
+        extensions = tuple((text(found[index], EGL_EXTENSIONS) or b"").decode().split())
+        display = display_of(EGL_PLATFORM_DEVICE_EXT, found[index], None)
+        vendor, version = "unknown", "unknown"
+        major, minor = integer(), integer()
+        if display and egl.eglInitialize(pointer(display), ctypes.byref(major), ctypes.byref(minor)):
+            vendor = (egl.eglQueryString(pointer(display), EGL_VENDOR) or b"?").decode()
+            version = (egl.eglQueryString(pointer(display), EGL_VERSION) or b"?").decode()
+        result.append(Device(index, vendor, version, extensions))
+    return result

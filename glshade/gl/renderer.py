@@ -1,0 +1,397 @@
+"""Renderer: draws scenes on one OpenGL context, and keeps what it compiled and uploaded for the next one."""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from collections import OrderedDict
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from types import TracebackType
+from typing import Any, Literal
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from glshade import __version__
+from glshade.assembly import Assembly, Instance, assemble
+from glshade.camera import window
+from glshade.digest import digest
+from glshade.gl.context import Backend, Context, open_context
+from glshade.gl.frame import Frame, Storage
+from glshade.gl.program import Program
+from glshade.gl.textures import upload
+from glshade.gl.vertices import Vertices
+from glshade.image import Image
+from glshade.plan import ProgramPlan, plan_instance
+from glshade.scene import Rate, Scene
+from glshade.source import PAGE, Source, expand, generate
+from glshade.uniforms import (
+    Values,
+    grouped,
+    light_pages,
+    light_uniforms,
+    object_uniforms,
+    rounded,
+    textures,
+)
+
+DType = Literal["uint8", "float32"]
+# Larger pictures are drawn in tiles: at 8192 x 8192 colour and depth already take 1.25 GiB in float32.
+TILE = 8192
+# Scenes whose programs and buffers stay at hand; an animation alternates between few.
+KEPT_SCENES = 8
+KEPT_TEXTURES = 256
+
+
+class ApproximateWarning(UserWarning):
+    """The picture has a part that is right in kind, but not pixel by pixel."""
+
+
+@dataclass(eq=False)
+class Draw:
+    """One draw call, with what it needs set before it."""
+
+    instance: Instance
+    plan: ProgramPlan
+    program: Program
+    vertices: moderngl.VertexArray
+    values: Values
+    samplers: list[tuple[str, moderngl.Texture]]
+    lights: Values
+    pages: list[tuple[str, moderngl.Buffer, int]]
+    # A further page of lights, added to what the first has drawn.
+    added: bool = False
+
+
+@dataclass(eq=False)
+class Prepared:
+    """A scene made ready to draw in one storage."""
+
+    scene: Scene
+    assembly: Assembly
+    draws: list[Draw]
+    attributes: dict[str, str]
+
+
+class Renderer:
+    """Draws scenes. A context manager: `with glshade.Renderer() as renderer: image = renderer.render(scene)`.
+
+    backend: auto, egl or standalone; device: an index of `glshade devices`. Errors: ContextError.
+    """
+
+    def __init__(self, backend: Backend = "auto", device: int | None = None) -> None:
+        self.context: Context = open_context(backend, device)
+        self._vertices = Vertices(self.context)
+        self._programs: dict[Source, Program] = {}
+        self._frames: dict[tuple[Any, ...], Frame] = {}
+        self._textures: OrderedDict[Any, moderngl.Texture] = OrderedDict()
+        self._prepared: OrderedDict[tuple[Any, ...], Prepared] = OrderedDict()
+        self._buffers: list[NDArray[Any]] = []
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+        self.release()
+
+    def release(self) -> None:
+        """Gives the context and all it holds back to the driver."""
+        self.context.release()
+
+    def render(self, scene: Scene, *, dtype: DType = "uint8", shading: Rate | None = None, tile: int | None = None) -> Image:
+        """The picture of a scene.
+
+        dtype: "uint8" for the picture as the film encodes it, "float32" for linear light, signed and unclipped. shading:
+        overrules every object's. tile: the largest side drawn in one piece [pixels]; left out: what the driver can.
+        Errors: SceneError, ShaderError.
+        """
+        film = scene.film
+        passes = _sample_passes(film.samples, self.context.gl.max_samples)
+        opaque = len(film.background) == 3
+        # Drawn straight into 8 bits where nothing has to be averaged or added in linear light afterwards.
+        direct = dtype == "uint8" and film.samples == 1 and opaque and len(scene.objects) > 0
+        prepared = self._prepare(scene, shading, film.encoding if direct else "linear")
+        if direct and any(draw.added or draw.plan.alpha == "blend" for draw in prepared.draws):
+            direct = False
+            prepared = self._prepare(scene, shading, "linear")
+        side = min(tile or TILE, self.context.largest_side)
+        width, height = film.size
+        channels = 3 if opaque else 4
+        on_gpu = dtype == "uint8" and len(passes) == 1
+        pixels = self._buffer((height, width, 4), np.uint8 if on_gpu else np.float32)
+        for x in range(0, width, side):
+            for y in range(0, height, side):
+                size = (min(side, width - x), min(side, height - y))
+                whole = size == (width, height)
+                part = pixels if whole else np.empty((size[1], size[0], 4), dtype=pixels.dtype)
+                self._draw_piece(prepared, (x, y), size, passes, direct, part)
+                if not whole:
+                    pixels[y : y + size[1], x : x + size[0]] = part
+        encoding = film.encoding if on_gpu else "linear"
+        image = Image(pixels[..., :channels], encoding, prepared.attributes)
+        return image if on_gpu or dtype == "float32" else image.encoded(film.encoding)
+
+    def _draw_piece(
+        self,
+        prepared: Prepared,
+        corner: tuple[int, int],
+        size: tuple[int, int],
+        passes: list[tuple[float, float]],
+        direct: bool,
+        out: NDArray[Any],
+    ) -> None:
+        """Fills out (h, w, 4) with the window of the picture at `corner`."""
+        film = prepared.scene.film
+        frame = self._frame(size, "rgba8" if direct else "rgba32f", min(film.samples, self.context.gl.max_samples))
+        background = _background(film.background, film.encoding if direct else "linear")
+        whole = prepared.assembly.view.clip_from_world(self.context.zero_to_one)
+        total: NDArray[np.float32] | None = None
+        for dx, dy in passes:
+            clip = rounded(window(whole, film.size, corner[0] + dx, corner[1] + dy, *size))
+            frame.begin(background)
+            self._draw_all(prepared, clip)
+            if out.dtype == np.uint8 and not direct:
+                self._encode(frame, film.encoding).readback(out)
+            elif len(passes) == 1:
+                frame.readback(out)
+            else:
+                piece = np.empty(out.shape, dtype=np.float32)
+                frame.readback(piece)
+                total = piece if total is None else total + piece
+        if total is not None:
+            out[...] = total / len(passes)
+
+    def _draw_all(self, prepared: Prepared, clip: NDArray[np.float32]) -> None:
+        gl = self.context.gl
+        gl.enable_only(moderngl.DEPTH_TEST)
+        gl.depth_func = ">"
+        viewer = rounded(prepared.assembly.view.toward_viewer)
+        placed: set[int] = set()
+        lit: dict[int, int] = {}
+        state: tuple[bool, ...] = ()
+        for draw in prepared.draws:
+            program = draw.program
+            if id(program) not in placed:
+                placed.add(id(program))
+                program.write("u_clip_from_world", clip)
+                program.write("u_viewer", viewer)
+            if lit.get(id(program)) != id(draw.lights):
+                lit[id(program)] = id(draw.lights)
+                for name, value in draw.lights.items():
+                    program.write(name, value)
+            for name, value in draw.values.items():
+                program.write(name, value)
+            for unit, (name, texture) in enumerate(draw.samplers):
+                texture.use(unit)
+                program.set_integer(name, unit)
+            for binding, (key, buffer, count) in enumerate(draw.pages):
+                buffer.bind_to_uniform_block(binding)
+                program.members[f"{key}_page"].binding = binding
+                program.set_integer(f"u_{key}_count", count)
+            wanted = (draw.plan.alpha == "blend", draw.added, not draw.instance.back_faces, draw.instance.mirrored)
+            if wanted != state:
+                state = wanted
+                self._set_state(*wanted)
+            draw.vertices.render()
+        gl.fbo.depth_mask = True
+
+    def _set_state(self, blended: bool, added: bool, culled: bool, mirrored: bool) -> None:
+        gl = self.context.gl
+        (gl.enable if culled else gl.disable)(moderngl.CULL_FACE)
+        # The picture is drawn upside down so that row 0 is the top, which turns counter-clockwise into clockwise.
+        gl.front_face = "ccw" if mirrored else "cw"
+        (gl.enable if blended or added else gl.disable)(moderngl.BLEND)
+        if blended or added:
+            gl.blend_func = (moderngl.ONE, moderngl.ONE if added else moderngl.ONE_MINUS_SRC_ALPHA)
+        # What is added falls on the very surface that its first page has drawn.
+        gl.depth_func = "==" if added and not blended else ">"
+        gl.fbo.depth_mask = not (blended or added)
+
+    def _encode(self, frame: Frame, encoding: Literal["linear", "srgb"]) -> Frame:
+        """An 8-bit frame of what `frame` holds in linear light."""
+        texture = frame.resolve()
+        picture = self._frame(frame.size, "rgba8", 1)
+        output = {"output": f'#include "output/{encoding}.glsl"\n'}
+        program = self._program(Source(expand("pass/picture.vert", {}), expand("pass/picture.frag", output)))
+        picture.target.use()
+        self.context.gl.enable_only(moderngl.NOTHING)
+        texture.use(0)
+        program.set_integer("u_linear", 0)
+        self.context.gl.vertex_array(program.gl, []).render(moderngl.TRIANGLES, vertices=3)
+        return picture
+
+    def _prepare(self, scene: Scene, shading: Rate | None, encoding: Literal["linear", "srgb"]) -> Prepared:
+        """Everything that does not change while the scene does not."""
+        key = (id(scene), shading, encoding)
+        kept = self._prepared.get(key)
+        if kept is None:
+            assembly = assemble(scene, shading)
+            kept = Prepared(scene, assembly, list(self._draws(scene, assembly, encoding)), self._attributes(scene))
+            self._prepared[key] = kept
+            if len(self._prepared) > KEPT_SCENES:
+                self._prepared.popitem(last=False)
+        self._prepared.move_to_end(key)
+        return kept
+
+    def _draws(self, scene: Scene, assembly: Assembly, encoding: Literal["linear", "srgb"]) -> Iterator[Draw]:
+        """Opaque objects by program, then blended ones from back to front."""
+        opaque: list[tuple[ProgramPlan, Instance]] = []
+        blended: list[tuple[ProgramPlan, Instance]] = []
+        shared: dict[tuple[ProgramPlan, tuple[int, ...]], tuple[Values, list[list[tuple[str, moderngl.Buffer, int]]]]] = {}
+        for instance in assembly.instances:
+            plan = plan_instance(instance, assembly, encoding)
+            (blended if plan.alpha == "blend" else opaque).append((plan, instance))
+        order = {plan: index for index, (plan, _) in reversed(list(enumerate(opaque)))}
+        opaque.sort(key=lambda pair: order[pair[0]])
+        if blended:
+            warnings.warn(
+                "blended surfaces are drawn back to front, triangle by triangle: approximate where they cross",
+                ApproximateWarning,
+                stacklevel=4,
+            )
+            middles = [i.world_from_object[:3, 3] + i.world_from_object[:3, :3] @ _middle(i) for _, i in blended]
+            depths = assembly.view.depth(np.array(middles))
+            blended = [blended[i] for i in np.argsort(-depths, kind="stable")]
+        for plan, instance in (*opaque, *blended):
+            key = (plan, instance.lights)
+            if key not in shared:
+                exposure = scene.film.exposure
+                shared[key] = (
+                    light_uniforms(plan, assembly, instance.lights, exposure),
+                    self._pages(plan, assembly, instance.lights, exposure),
+                )
+            yield from self._draw(plan, instance, assembly, *shared[key])
+
+    def _draw(
+        self,
+        plan: ProgramPlan,
+        instance: Instance,
+        assembly: Assembly,
+        lights: Values,
+        pages: list[list[tuple[str, moderngl.Buffer, int]]],
+    ) -> Iterator[Draw]:
+        """The first draw of an instance, and one more for every further page of lights."""
+        order = _back_to_front(instance, assembly) if plan.alpha == "blend" else None
+        for index in range(max((len(group) for group in pages), default=1)):
+            here = plan
+            if index:
+                # What is counted exactly, and ambient light, has been drawn with the first page.
+                many = tuple(group for group, of in zip(_paged(plan), pages, strict=True) if index < len(of))
+                here = replace(plan, lights=many, ambient=False, parameters=_without_ambient(plan))
+            program = self._program(generate(here))
+            values = object_uniforms(here, instance, assembly.view.eye)
+            samplers = [(name, self._texture(texture)) for name, texture in textures(here, instance.material).items()]
+            vertices = self._vertices.array(instance.mesh, program, order)
+            page = [group[index] for group in pages if index < len(group)]
+            yield Draw(instance, here, program, vertices, values, samplers, {} if index else lights, page, bool(index))
+
+    def _pages(
+        self, plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...], exposure: float
+    ) -> list[list[tuple[str, moderngl.Buffer, int]]]:
+        groups = grouped(assembly, chosen)
+        result = []
+        for group in _paged(plan):
+            lights = groups[group.type, group.falloff]
+            records = light_pages(group, lights, assembly.view.eye, exposure, PAGE)
+            whole = PAGE * records[0].dtype.itemsize
+            result.append([(group.key, self.context.gl.buffer(r.tobytes().ljust(whole, b"\0")), len(r)) for r in records])
+        return result
+
+    def _attributes(self, scene: Scene) -> dict[str, str]:
+        return {
+            "glshade:version": __version__,
+            "glshade:renderer": f"{self.context.renderer}; {self.context.version}",
+            "glshade:scene": digest(scene),
+            "glshade:camera": scene.camera.model_dump_json(exclude_none=True),
+        }
+
+    def _program(self, source: Source) -> Program:
+        if source not in self._programs:
+            self._programs[source] = Program(self.context, source)
+        return self._programs[source]
+
+    def _texture(self, texture: Any) -> moderngl.Texture:
+        key = (
+            texture.texture,
+            texture.texture.stat().st_mtime_ns,
+            texture.wrap,
+            getattr(texture, "encoding", "linear"),
+        )
+        if key not in self._textures:
+            self._textures[key] = upload(self.context, texture)
+            if len(self._textures) > KEPT_TEXTURES:
+                self._textures.popitem(last=False)
+        return self._textures[key]
+
+    def _frame(self, size: tuple[int, int], storage: Storage, samples: int) -> Frame:
+        key = (size, storage, samples)
+        if key not in self._frames:
+            if len(self._frames) > 2:
+                for frame in self._frames.values():
+                    frame.release()
+                self._frames.clear()
+            self._frames[key] = Frame(self.context, size, storage, samples)
+        return self._frames[key]
+
+    def _buffer(self, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+        """An array for a picture: one that no image holds any more, else a new one. Fresh memory costs a page fault every 4 KiB."""
+        for buffer in self._buffers:
+            # Held by the list, by the loop and by getrefcount's own argument, and by nobody else.
+            if sys.getrefcount(buffer) == 3 and buffer.shape == shape and buffer.dtype == dtype:
+                return buffer
+        self._buffers = [*self._buffers[-1:], np.empty(shape, dtype=dtype)]
+        return self._buffers[-1]
+
+
+def _paged(plan: ProgramPlan) -> list[Any]:
+    return [group for group in plan.lights if group.count == 0]
+
+
+def _without_ambient(plan: ProgramPlan) -> tuple[tuple[str, str], ...]:
+    from glshade.brdfs import BRDFS
+
+    declared = BRDFS[plan.brdf].parameters()
+    return tuple((name, "unused" if declared[name].lobe == "ambient" else use) for name, use in plan.parameters)
+
+
+def _middle(instance: Instance) -> NDArray[np.float64]:
+    middle: NDArray[np.float64] = instance.mesh.positions.mean(axis=0, dtype=np.float64)
+    return middle
+
+
+def _back_to_front(instance: Instance, assembly: Assembly) -> NDArray[np.intp]:
+    centroids = instance.mesh.positions[instance.mesh.triangles].mean(axis=1, dtype=np.float64)
+    world = centroids @ instance.world_from_object[:3, :3].T + instance.world_from_object[:3, 3]
+    return np.argsort(-assembly.view.depth(world), kind="stable")
+
+
+def _sample_passes(samples: int, available: int) -> list[tuple[float, float]]:
+    """Offsets [pixels] of the pictures that make up the samples: one, or several where the driver has too few of its own."""
+    count = max(1, -(-samples // max(available, 1)))
+    # Along a diagonal that a rotated grid of four does not have, about the pixel's middle.
+    return [((i + 0.5) / count - 0.5, ((i + 0.5) / count - 0.5) / 2) if count > 1 else (0.0, 0.0) for i in range(count)]
+
+
+def _background(colour: tuple[float, ...], encoding: Literal["linear", "srgb"]) -> tuple[float, float, float, float]:
+    """Four numbers, premultiplied, encoded as the frame is."""
+    from glshade.image import linear_to_srgb
+
+    alpha = colour[3] if len(colour) == 4 else 1.0
+    rgb = [c * alpha for c in colour[:3]]
+    r, g, b = (float(c) for c in (linear_to_srgb(np.array(rgb)) if encoding == "srgb" else rgb))
+    return r, g, b, alpha
+
+
+def render(
+    scene: Scene,
+    *,
+    dtype: DType = "uint8",
+    shading: Rate | None = None,
+    backend: Backend = "auto",
+    device: int | None = None,
+) -> Image:
+    """One picture, on a context of its own; for several, keep a Renderer. Arguments and errors as there."""
+    with Renderer(backend, device) as renderer:
+        return renderer.render(scene, dtype=dtype, shading=shading)

@@ -1,0 +1,73 @@
+"""Textures on the GPU: float32 and linear, so that filtering is exact to float and sRGB is decoded before it is averaged."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterator
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from glshade import image
+from glshade.gl.context import GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, Context
+from glshade.texture import NormalMap, Texture
+
+WRAP = {"repeat": 0x2901, "clamp": 0x812F, "mirror": 0x8370}
+Pixels = NDArray[np.float32]
+
+
+def levels(pixels: Pixels) -> Iterator[Pixels]:
+    """The mipmap chain, from the picture itself down to one pixel: each level is the average over areas of the one before.
+
+    Sides that are odd are weighted as Guthe and Heckbert 2005 do, so that no row is lost.
+    """
+    yield pixels
+    while max(pixels.shape[:2]) > 1:
+        pixels = _halved(_halved(pixels, 0), 1)
+        yield pixels
+
+
+def _halved(pixels: Pixels, axis: int) -> Pixels:
+    x = np.moveaxis(pixels, axis, 0)
+    size = len(x)
+    if size == 1:
+        return pixels
+    half = size // 2
+    if size % 2 == 0:
+        result = 0.5 * (x[0::2] + x[1::2])
+    else:
+        i = np.arange(half, dtype=np.float32).reshape(-1, *[1] * (x.ndim - 1))
+        first, middle, last = x[0:-2:2], x[1:-1:2], x[2::2]
+        result = ((half - i) * first + half * middle + (i + 1) * last) / size
+    return np.ascontiguousarray(np.moveaxis(result.astype(np.float32), 0, axis))
+
+
+def upload(context: Context, texture: Texture | NormalMap) -> moderngl.Texture:
+    """The texture, trilinear, with its wrap modes. Errors: AssetError."""
+    encoding = "linear" if isinstance(texture, NormalMap) else texture.encoding
+    pixels, _ = image.read(texture.texture, encoding)
+    # GL's first row is v = 0, the bottom; a file's is the top.
+    chain = list(levels(np.ascontiguousarray(pixels[::-1])))
+    while max(chain[0].shape[:2]) > context.largest_side:
+        chain.pop(0)
+    height, width, _ = chain[0].shape
+    result = context.gl.texture((width, height), 4, chain[0].tobytes(), dtype="f4")
+    result.build_mipmaps()
+    for level, pixels in enumerate(chain[1:], 1):
+        result.write(pixels.tobytes(), level=level)
+    result.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    result.repeat_x, result.repeat_y = (mode != "clamp" for mode in texture.wrap)
+    if "mirror" in texture.wrap:
+        _mirror(context, result, texture.wrap)
+    return result
+
+
+def _mirror(context: Context, texture: moderngl.Texture, wrap: tuple[str, str]) -> None:
+    """moderngl knows repeat and clamp alone."""
+    parameter = context.procedure("glTexParameteri", None, ctypes.c_uint, ctypes.c_uint, ctypes.c_int)
+    if parameter is not None:
+        texture.use(0)
+        # moderngl binds on the default unit when it makes a texture, and leaves the active unit at the one it used last.
+        for axis, mode in zip((GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T), wrap, strict=True):
+            parameter(GL_TEXTURE_2D, axis, WRAP[mode])

@@ -1,0 +1,59 @@
+"""Vertices: meshes on the GPU, with the attributes that a program asks for and no others."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from typing import Any
+
+import moderngl
+import numpy as np
+
+from glshade.gl.context import Context
+from glshade.gl.program import Program
+from glshade.mesh import Mesh
+
+ATTRIBUTES = {
+    "a_position": ("positions", 3),
+    "a_normal": ("normals", 3),
+    "a_tangent": ("tangents", 4),
+    "a_uv": ("uvs", 2),
+    "a_colour": ("colours", 4),
+    "a_centroid": ("centroids", 3),
+}
+# Meshes kept on the GPU; the least recently used leave first.
+KEPT = 4096
+
+
+class Vertices:
+    """The buffers of a context, by mesh."""
+
+    def __init__(self, context: Context) -> None:
+        self._context = context
+        self._buffers: OrderedDict[tuple[Any, ...], tuple[Mesh, moderngl.Buffer]] = OrderedDict()
+
+    def array(self, mesh: Mesh, program: Program, order: np.ndarray[Any, Any] | None = None) -> moderngl.VertexArray:
+        """The mesh, ready to be drawn by the program. order: triangle numbers, where they matter (blending)."""
+        names = tuple(name for name in program.attributes if name in ATTRIBUTES)
+        sizes = [ATTRIBUTES[name][1] for name in names]
+        buffer = self._buffer((id(mesh), names), mesh, lambda: _interleaved(mesh, names))
+        if order is None:
+            indices = self._buffer((id(mesh), "triangles"), mesh, mesh.triangles.tobytes)
+        else:
+            indices = self._context.gl.buffer(mesh.triangles[order].tobytes())
+        layout = " ".join(f"{size}f" for size in sizes)
+        return self._context.gl.vertex_array(program.gl, [(buffer, layout, *names)], indices)
+
+    def _buffer(self, key: tuple[Any, ...], mesh: Mesh, data: Any) -> moderngl.Buffer:
+        # The mesh is kept beside its buffer, so that no other object can come to have its id.
+        kept = self._buffers.get(key)
+        if kept is None:
+            kept = self._buffers[key] = (mesh, self._context.gl.buffer(data()))
+            if len(self._buffers) > KEPT:
+                self._buffers.popitem(last=False)
+        self._buffers.move_to_end(key)
+        return kept[1]
+
+
+def _interleaved(mesh: Mesh, names: tuple[str, ...]) -> bytes:
+    """Vertex after vertex: what one vertex needs lies together."""
+    return np.hstack([getattr(mesh, ATTRIBUTES[name][0]) for name in names]).tobytes()

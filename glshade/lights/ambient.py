@@ -1,0 +1,14 @@
+"""ambient: light from everywhere alike."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal
+
+from glshade.lights import Light
+
+
+class AmbientLight(Light):
+    """Adds the material's ambient reflectance times its intensity. A hack, and needed (lecture slide 23)."""
+
+    type: Literal["ambient"] = "ambient"
+    omnidirectional: ClassVar[bool] = True

@@ -1,0 +1,191 @@
+"""Plan: what a scene's programs must hold, and nothing else.
+
+A ProgramPlan is frozen and hashable: equal plans are one program. Values (colours, exponents, positions) are not in it,
+they are uniforms; what changes the text of a program is.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Literal
+
+from glshade.assembly import Assembly, Instance, assemble
+from glshade.brdfs import BRDFS
+from glshade.lights import Falloff
+from glshade.scene import Rate, Scene
+from glshade.texture import Texture
+
+# Up to here the count of lights is in the program, and its loop has a constant end; above, a uniform block holds a page.
+EXACT_LIGHTS = 8
+
+Use = Literal["uniform", "texture", "unused"]
+
+
+@dataclass(frozen=True, order=True)
+class LightGroup:
+    """Lights of one kind. count 0: a page of a uniform block, counted when drawn."""
+
+    type: str
+    falloff: Falloff
+    count: int
+
+    @property
+    def key(self) -> str:
+        """In identifiers: `point_inverse_square`."""
+        return self.type + {"none": "", "1/r": "_inverse", "1/r^2": "_inverse_square"}[self.falloff]
+
+
+@dataclass(frozen=True)
+class ProgramPlan:
+    """What one program holds.
+
+    parameters: (name, use) in the struct's order; use may also be the name of the parameter it equals. alpha_from: the
+    parameter whose texture carries alpha.
+    """
+
+    rate: Rate
+    brdf: str
+    parameters: tuple[tuple[str, str], ...]
+    lights: tuple[LightGroup, ...]
+    ambient: bool
+    viewer: Literal["perspective", "orthographic"]
+    both_sides: bool
+    alpha: Literal["opaque", "mask", "blend"]
+    alpha_from: str | None
+    vertex_colours: bool
+    normal_map: bool
+    encoding: Literal["linear", "srgb"]
+
+    @property
+    def directed(self) -> bool:
+        """Whether any light comes from a direction, so that normal and viewer matter."""
+        return bool(self.lights)
+
+    @property
+    def positions(self) -> bool:
+        """Whether the shading needs to know where the point is."""
+        placed = any(group.falloff != "none" or group.type != "directional" for group in self.lights)
+        return placed or (self.directed and self.viewer == "perspective")
+
+    @property
+    def tangents(self) -> bool:
+        """Whether the shading frame needs tangents."""
+        return self.directed and (self.normal_map or BRDFS[self.brdf].anisotropic)
+
+    @property
+    def textured(self) -> tuple[str, ...]:
+        """The parameters that are textures."""
+        return tuple(name for name, use in self.parameters if use == "texture")
+
+    def __str__(self) -> str:
+        lights = [f"{group.count or 'many'} {group.key}" for group in self.lights] + ["ambient"] * self.ambient
+        extras = [f"{name} textured" for name in self.textured]
+        extras += ["normal map"] * self.normal_map + ["vertex colours"] * self.vertex_colours
+        extras += ["both sides"] * self.both_sides + [f"alpha {self.alpha}"] * (self.alpha != "opaque")
+        return ", ".join(
+            [f"{self.brdf} per {PER[self.rate]}", " + ".join(lights) or "no light", self.viewer, *extras, self.encoding]
+        )
+
+
+PER = {"flat": "face", "gouraud": "vertex", "phong": "pixel"}
+
+
+@dataclass(frozen=True)
+class Plan:
+    """The programs of a scene, and which object is drawn with which; reasons: (feature, what requires it)."""
+
+    programs: tuple[ProgramPlan, ...]
+    draws: tuple[tuple[str, int], ...]
+    reasons: tuple[tuple[str, str], ...]
+
+    def __str__(self) -> str:
+        lines = []
+        for index, program in enumerate(self.programs):
+            names = [name for name, which in self.draws if which == index]
+            shown = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+            lines.append(f"program {index}: {program}\n  draws {shown}")
+        return "\n".join([*lines, *(f"{feature}: because of {reason}" for feature, reason in self.reasons)])
+
+
+def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["linear", "srgb"]) -> ProgramPlan:
+    """The program for one instance, in canonical form: what cannot show is left out."""
+    reached = [assembly.lights[i] for i in instance.lights]
+    ambient = any(light.omnidirectional for light in reached)
+    kinds: Counter[tuple[str, Falloff]] = Counter(
+        (light.type, getattr(light, "falloff", "none")) for light in reached if not light.omnidirectional
+    )
+    material = instance.material
+    model = BRDFS[material.brdf]
+    # A model that answers only to ambient light never asks for another.
+    if all(declared.lobe == "ambient" for declared in model.parameters().values()):
+        kinds.clear()
+    groups = tuple(sorted(LightGroup(kind, falloff, n if n <= EXACT_LIGHTS else 0) for (kind, falloff), n in kinds.items()))
+    parameters = []
+    for name, declared in model.parameters().items():
+        value = getattr(material, name)
+        used = groups or ambient if declared.lobe == "all" else ambient
+        if not used:
+            use: str = "unused"
+        elif value is None and declared.same_as is not None:
+            use = declared.same_as
+        else:
+            use = "texture" if isinstance(value, Texture) else "uniform"
+        parameters.append((name, use))
+    base = next((name for name, declared in model.parameters().items() if declared.base), None)
+    carries_alpha = material.alpha_mode != "opaque" and base is not None and isinstance(getattr(material, base), Texture)
+    return ProgramPlan(
+        rate=instance.rate,
+        brdf=material.brdf,
+        parameters=tuple(parameters),
+        lights=groups,
+        ambient=ambient,
+        viewer="perspective" if assembly.view.perspective else "orthographic",
+        both_sides=instance.back_faces and bool(groups),
+        alpha=material.alpha_mode,
+        alpha_from=base if carries_alpha else None,
+        vertex_colours=instance.vertex_colours and (bool(groups) or ambient or material.alpha_mode != "opaque"),
+        normal_map=material.normal_map is not None and bool(groups),
+        encoding=encoding,
+    )
+
+
+def explain(scene: Scene, shading: Rate | None = None) -> Plan:
+    """What the programs of a scene hold, and why.
+
+    Errors: SceneError.
+    """
+    assembly = assemble(scene, shading)
+    return plan(assembly, scene.film.encoding if scene.film.samples == 1 else "linear")
+
+
+def plan(assembly: Assembly, encoding: Literal["linear", "srgb"]) -> Plan:
+    """The plan of an assembled scene."""
+    programs: dict[ProgramPlan, int] = {}
+    draws: list[tuple[str, int]] = []
+    reasons: dict[str, str] = {}
+    for instance in assembly.instances:
+        program = plan_instance(instance, assembly, encoding)
+        draws.append((instance.name, programs.setdefault(program, len(programs))))
+        reasons.setdefault(f"brdf {program.brdf} per {PER[program.rate]}", instance.name)
+        for name in program.textured:
+            reasons.setdefault(f"texture of {name}", instance.name)
+        if program.normal_map:
+            reasons.setdefault("normal map", instance.name)
+        if program.vertex_colours:
+            reasons.setdefault("vertex colours", instance.name)
+        if program.both_sides:
+            reasons.setdefault("both sides", f"{instance.name}, whose mesh is open, or seen from inside, or told so")
+        if program.alpha != "opaque":
+            reasons.setdefault(f"alpha {program.alpha}", instance.name)
+        for group in program.lights:
+            first = next(
+                i
+                for i in instance.lights
+                if (assembly.lights[i].type, getattr(assembly.lights[i], "falloff", "none")) == (group.type, group.falloff)
+            )
+            reasons.setdefault(f"light {group.key}", assembly.lights[first].name or f"lights[{first}]")
+        if program.ambient:
+            first = next(i for i in instance.lights if assembly.lights[i].omnidirectional)
+            reasons.setdefault("light ambient", assembly.lights[first].name or f"lights[{first}]")
+    return Plan(tuple(programs), tuple(draws), tuple(reasons.items()))

@@ -1,0 +1,203 @@
+"""Scene: everything a picture is made of. These models are the file format, its JSON schema and the Python interface."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, SkipValidation, Tag, WithJsonSchema
+
+from glshade.brdfs import BRDFS, Brdf
+from glshade.camera import CAMERAS, Camera, Matrix4, Perspective, affine
+from glshade.document import Chosen, Document, File, Finite, Triple, Vector3, fault, nearest
+from glshade.lights import LIGHTS, Light
+from glshade.mesh import Mesh
+from glshade.shape import SHAPES, Shape
+
+Array = NDArray[np.float64]
+Rate = Literal["flat", "gouraud", "phong"]
+Normals = Literal["auto", "face", "smooth"]
+Sides = Literal["auto", "front", "both"]
+# The largest side of a picture: 2^17 pixels of 16 bytes in one row are 2 MiB, still a file that other programs open.
+LARGEST_SIDE = 131072
+Side = Annotated[int, Field(ge=1, le=LARGEST_SIDE)]
+
+
+def _scale(value: Vector3) -> Vector3:
+    if 0.0 in value:
+        raise fault(f"must not be zero along any axis, not {list(value)}: it flattens the object")
+    return value
+
+
+class Transform(Document):
+    """world from object (or from parent): scaled, then turned about x, then y, then z, then moved; or a matrix."""
+
+    translate: Vector3 = Field((0.0, 0.0, 0.0), description="[scene units]")
+    rotate: Vector3 = Field((0.0, 0.0, 0.0), description="about x, then y, then z [degrees]")
+    scale: Annotated[Triple, AfterValidator(_scale)] = Field((1.0, 1.0, 1.0), description="negative mirrors")
+    matrix: Annotated[Matrix4, AfterValidator(affine)] | None = Field(
+        None, description="in place of the three: rows top to bottom, column vectors"
+    )
+
+    @classmethod
+    def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
+        if isinstance(data, Mapping) and data.get("matrix") is not None:
+            for key in ("translate", "rotate", "scale"):
+                if key in data:
+                    yield (key,), "not together with matrix, which says it all"
+
+    def array(self) -> Array:
+        """(4, 4) float64."""
+        if self.matrix is not None:
+            return np.array(self.matrix)
+        result = np.eye(4)
+        (cx, cy, cz), (sx, sy, sz) = ([f(math.radians(a)) for a in self.rotate] for f in (math.cos, math.sin))
+        about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
+        about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
+        about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
+        result[:3, :3] = about_z @ about_y @ about_x * np.array(self.scale)
+        result[:3, 3] = self.translate
+        return result
+
+
+def _mesh(value: Any) -> Any:
+    """A mesh made in Python: a Mesh, trimesh's Trimesh (anything with vertices and faces), or (vertices, faces)."""
+    if isinstance(value, Mesh | str | Path):
+        return value
+    normals = None
+    if hasattr(value, "vertices") and hasattr(value, "faces"):
+        vertices, faces = value.vertices, value.faces
+        # trimesh computes normals on demand; only those it was given are the mesh's own.
+        if "vertex_normals" in getattr(value, "_cache", ()):
+            normals = value.vertex_normals
+    elif isinstance(value, tuple | list) and len(value) == 2:
+        vertices, faces = value
+    else:
+        raise fault("must be the path of a mesh file (or, in Python, a Mesh, a trimesh or a pair of vertices and faces)")
+    return Mesh.build(np.asarray(vertices, dtype=np.float64), np.asarray(faces), normals=normals)
+
+
+def _mesh_branch(value: Any) -> str:
+    return "value" if isinstance(value, Mesh) else "texture-table"
+
+
+MeshSource = Annotated[
+    Annotated[SkipValidation[Mesh], Tag("value"), WithJsonSchema({"type": "string"})] | Annotated[File, Tag("texture-table")],
+    Discriminator(_mesh_branch),
+]
+Material = Annotated[Brdf, Chosen(BRDFS, "brdf")]
+
+
+def _material_branch(value: Any) -> str:
+    return "shorthand" if isinstance(value, str) else "table"
+
+
+class Object(Document):
+    """Something to draw: a mesh (or a shape), where it is, what it is made of, and how it is shaded."""
+
+    name: str | None = Field(None, description="for light linking, parents and messages")
+    mesh: Annotated[MeshSource, BeforeValidator(_mesh)] | None = Field(None, description="mesh file: OBJ, PLY, STL, glTF")
+    shape: Annotated[Shape, Chosen(SHAPES, "type", shorthand=True)] | None = Field(None, description="or a primitive")
+    transform: Transform = Transform()
+    parent: str | None = Field(None, description="name of the object whose transform comes after this one's")
+    material: (
+        Annotated[Annotated[str, Tag("shorthand")] | Annotated[Material, Tag("table")], Discriminator(_material_branch)] | None
+    ) = Field(None, description="name of a material, or a material in place; left out: the mesh file's own, else grey phong")
+    shading: Rate = Field("phong", description="where the model is evaluated: per face, per vertex or per pixel")
+    normals: Normals = Field("auto", description="face; smooth up to the threshold; auto: the mesh's own where it has them")
+    threshold: Annotated[float, Field(ge=0, le=180)] = Field(
+        60.0, description="smooth: an edge is sharp where its faces' normals differ by more [degrees]"
+    )
+    sides: Sides = Field("auto", description="front: back faces are culled; both: normals turn to the viewer; auto: what fits")
+    vertex_colours: bool = Field(True, description="whether the mesh's vertex colours multiply the base colour")
+
+    @classmethod
+    def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
+        if isinstance(data, Mapping) and (data.get("mesh") is None) == (data.get("shape") is None):
+            yield (), "needs a mesh or a shape, and not both"
+
+
+def _colour_with_alpha(value: tuple[float, ...]) -> tuple[float, ...]:
+    if len(value) not in (3, 4):
+        raise fault(f"must be 3 numbers, or 4 with alpha, not {len(value)}")
+    if len(value) == 4 and not 0 <= value[3] <= 1:
+        raise fault(f"alpha must be from 0 to 1, not {value[3]:g}")
+    return value
+
+
+class Film(Document):
+    """What the picture is recorded on."""
+
+    size: tuple[Side, Side] = Field((512, 512), description="width, height [pixels]")
+    samples: Literal[1, 2, 4, 8] = Field(1, description="samples a pixel for smooth edges, resolved in linear light")
+    background: Annotated[tuple[Finite, ...], AfterValidator(_colour_with_alpha)] = Field(
+        (0.0, 0.0, 0.0),
+        description="linear Rec. 709; with a fourth number, alpha, the picture has alpha too (premultiplied)",
+    )
+    encoding: Literal["srgb", "linear"] = Field("srgb", description="of 8-bit pictures; EXR is always linear")
+    exposure: Annotated[float, Field(ge=-64, le=64)] = Field(0.0, description="doubles all light [stops]")
+
+
+def _get(item: Any, key: str) -> Any:
+    return item.get(key) if isinstance(item, Mapping) else getattr(item, key, None)
+
+
+def _items(data: Any, key: str) -> list[Any]:
+    value = _get(data, key)
+    return list(value) if isinstance(value, list | tuple) else []
+
+
+class Scene(Document):
+    """The whole: what is drawn, what it is made of, what lights it, who looks, and on what it is recorded."""
+
+    description: str = Field("", description="what there is to see")
+    film: Film = Film()
+    camera: Annotated[Camera, Chosen(CAMERAS, "type", default="perspective")] = Perspective()
+    materials: dict[str, Material] = Field({}, description="name -> material")
+    objects: tuple[Object, ...] = Field(description="what is drawn")
+    lights: tuple[Annotated[Light, Chosen(LIGHTS, "type")], ...] | None = Field(
+        None, description="left out: a key light, a fill and a little ambient, placed about the camera; [] is darkness"
+    )
+
+    @classmethod
+    def cross_faults(cls, data: Any) -> Iterator[tuple[tuple[str | int, ...], str]]:
+        objects = _items(data, "objects")
+        if _get(data, "objects") in ([], ()):
+            yield ("objects",), "is empty: there is nothing to draw"
+        materials = _get(data, "materials")
+        materials = materials if isinstance(materials, Mapping) else {}
+        names: dict[str, int] = {}
+        for index, item in enumerate(objects):
+            name = _get(item, "name")
+            if isinstance(name, str):
+                if name in names:
+                    yield ("objects", index, "name"), f'"{name}" is already the name of objects[{names[name]}]'
+                names.setdefault(name, index)
+        parents = {_get(item, "name"): _get(item, "parent") for item in objects}
+        for index, item in enumerate(objects):
+            material, parent = _get(item, "material"), _get(item, "parent")
+            if isinstance(material, str) and material not in materials:
+                yield (
+                    ("objects", index, "material"),
+                    f'no material is named "{material}"' + nearest(material, materials),
+                )
+            if parent is None:
+                continue
+            if parent not in names:
+                yield ("objects", index, "parent"), f'no object is named "{parent}"' + nearest(parent, names)
+                continue
+            chain = [_get(item, "name")]
+            while parent is not None and parent not in chain:
+                chain.append(parent)
+                parent = parents.get(parent)
+            if parent is not None and parent == chain[0]:
+                yield ("objects", index, "parent"), "a cycle: " + " -> ".join(str(link) for link in [*chain, parent])
+        for index, light in enumerate(_items(data, "lights")):
+            only = _get(light, "only")
+            for place, name in enumerate(only if isinstance(only, list | tuple) else ()):
+                if isinstance(name, str) and name not in names:
+                    yield ("lights", index, "only", place), f'no object is named "{name}"' + nearest(name, names)

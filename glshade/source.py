@@ -1,0 +1,293 @@
+"""Source: the text of a program's stages, and where each line came from. No GL.
+
+The files under shaders/ are whole GLSL that any tool can read; a plan chooses among them, and what is left to write (the
+uniforms, the light loops) is generated into the places that the passes name in angle brackets: `#include <surface>`.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+from glshade.brdfs import BRDFS
+from glshade.document import nearest
+from glshade.errors import ShaderError
+from glshade.lights import LIGHTS
+from glshade.plan import LightGroup, ProgramPlan
+
+# Inside a wheel the shaders lie beside this module; in a checkout, beside the package.
+_INSTALLED = Path(__file__).parent / "_shaders"
+SHADERS = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parent.parent / "shaders"
+
+# A page of lights in a uniform block: 16 KiB is what every driver has, and a spot light, the largest, takes 64 bytes.
+PAGE = 256
+
+_INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One stage's text. lines[i]: (file, line) of the text's line i + 1; generated text has its name in brackets as file."""
+
+    text: str
+    lines: tuple[tuple[str, int], ...]
+
+    def place(self, line: int) -> str:
+        """`file:line` of a line of the text, counted from 1."""
+        file, number = self.lines[min(max(line, 1), len(self.lines)) - 1]
+        return f"{file}:{number}"
+
+
+@dataclass(frozen=True)
+class Source:
+    """A program's text. Without a fragment stage, what the vertex stage writes is captured."""
+
+    vertex: Stage
+    fragment: Stage | None
+
+
+def expand(name: str, generated: Mapping[str, str], root: Path | None = None) -> Stage:
+    """The file `name` under the shader folder with its includes in place, each once.
+
+    generated: text for the includes in angle brackets. Errors: ShaderError for a file that is not there.
+    """
+    root = root or SHADERS
+    text: list[str] = []
+    lines: list[tuple[str, int]] = []
+    seen = {name}
+
+    def read(path: str, asked_from: str) -> list[str]:
+        try:
+            return (root / path).read_text(encoding="utf-8").splitlines()
+        except OSError:
+            names = [str(p.relative_to(root)) for p in root.rglob("*") if p.is_file()]
+            raise ShaderError(f'{asked_from}: no shader file "{path}"{nearest(path, names)}') from None
+
+    def walk(file: str, source: list[str]) -> None:
+        for number, line in enumerate(source, 1):
+            include = _INCLUDE.match(line)
+            if include is None:
+                text.append(line)
+                lines.append((file, number))
+                continue
+            path, slot = include.groups()
+            wanted = path or f"<{slot}>"
+            if wanted in seen:
+                continue
+            seen.add(wanted)
+            if path is not None:
+                walk(str(root / path), read(path, f"{file}:{number}"))
+            elif slot in generated:
+                walk(wanted, generated[slot].splitlines())
+            else:
+                raise ShaderError(f"{file}:{number}: nothing is generated for <{slot}>{nearest(slot, generated)}")
+
+    walk(str(root / name), read(name, name))
+    return Stage("\n".join(text) + "\n", tuple(lines))
+
+
+@lru_cache(maxsize=1024)
+def generate(plan: ProgramPlan) -> Source:
+    """The text of the program that `plan` describes. The same plan gives the same text."""
+    name = plan.rate + ("_both" if plan.both_sides else "")
+    if plan.rate == "phong":
+        vertex = {"surface": _interpolated(plan)}
+        fragment = {"surface": _shading(plan, _Interpolated(plan)) + _alpha(plan)}
+        vertex_pass, fragment_pass = "phong.vert", f"{name}.frag"
+    else:
+        vertex = {"surface": _shading(plan, _AtVertex(plan)) + _alpha_inputs(plan, "out")}
+        fragment = {"surface": _alpha_inputs(plan, "in") + _alpha(plan)}
+        vertex_pass = f"{name}.vert"
+        fragment_pass = f"{name}.frag" if plan.rate == "gouraud" else "flat.frag"
+    fragment["output"] = f'#include "output/{plan.encoding}.glsl"\n'
+    return Source(expand(f"pass/{vertex_pass}", vertex), expand(f"pass/{fragment_pass}", fragment))
+
+
+class _Interpolated:
+    """The names of a surface's quantities in the fragment stage."""
+
+    def __init__(self, plan: ProgramPlan) -> None:
+        self.position, self.normal, self.tangent = "v_position", "v_normal", "v_tangent"
+        self.uv, self.colour = "v_uv", "v_colour"
+        self.declarations = _varyings(plan, "in")
+
+
+class _AtVertex:
+    """The same in the vertex stage; a flat triangle is shaded at its centroid."""
+
+    def __init__(self, plan: ProgramPlan) -> None:
+        place = "a_centroid" if plan.rate == "flat" else "a_position"
+        self.position = f"world({place})"
+        self.normal, self.tangent = "world_normal(a_normal)", "world_tangent(a_tangent)"
+        self.uv, self.colour = "a_uv", "a_colour"
+        wanted = _wanted(plan)
+        attributes = [f"in {TYPES[name]} a_{name};" for name in wanted if name != "position"]
+        attributes += ["in vec3 a_centroid;"] * (plan.rate == "flat" and plan.positions)
+        self.declarations = "".join(f"{line}\n" for line in attributes) + _transforms(plan)
+
+
+TYPES = {"position": "vec3", "normal": "vec3", "tangent": "vec4", "uv": "vec2", "colour": "vec4"}
+
+
+def _wanted(plan: ProgramPlan) -> list[str]:
+    """What the shading asks of a surface, in a fixed order."""
+    wanted = ["position"] * plan.positions + ["normal"] * plan.directed + ["tangent"] * plan.tangents
+    return wanted + ["uv"] * bool(plan.textured or plan.normal_map) + ["colour"] * plan.vertex_colours
+
+
+def _varyings(plan: ProgramPlan, direction: str) -> str:
+    names = _wanted(plan)
+    if plan.alpha_from and "uv" not in names:
+        names.append("uv")
+    return "".join(f"{direction} {TYPES[name]} v_{name};\n" for name in names)
+
+
+def _transforms(plan: ProgramPlan) -> str:
+    text = ""
+    if plan.directed:
+        text += '#include "lib/normal_transform.glsl"\n'
+    if plan.tangents:
+        text += '#include "lib/tangent_transform.glsl"\n'
+    return text
+
+
+def _interpolated(plan: ProgramPlan) -> str:
+    """The vertex stage under phong: hands on what the fragment stage asks for."""
+    names = _wanted(plan)
+    if plan.alpha_from and "uv" not in names:
+        names.append("uv")
+    values = {
+        "position": "world(a_position)",
+        "normal": "world_normal(a_normal)",
+        "tangent": "world_tangent(a_tangent)",
+        "uv": "a_uv",
+        "colour": "a_colour",
+    }
+    lines = [f"in {TYPES[name]} a_{name};" for name in names if name != "position"]
+    body = [f"    v_{name} = {values[name]};" for name in names]
+    text = "\n".join(lines) + "\n" + _transforms(plan) + _varyings(plan, "out")
+    return text + "\nvoid interpolate() {\n" + "\n".join(body) + "\n}\n"
+
+
+def _material(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
+    model, struct = BRDFS[plan.brdf], BRDFS.class_name(plan.brdf)
+    declared = model.parameters()
+    text, body = f'#include "brdf/{plan.brdf}.glsl"\n', []
+    for name, use in plan.parameters:
+        colour = model.is_colour(name)
+        kind, channels = ("vec3", "rgb") if colour else ("float", "r")
+        value = f"u_{name}"
+        if use == "unused":
+            body.append(f"    m.{name} = {kind}(0.0);")
+            continue
+        if use in declared:
+            body.append(f"    m.{name} = m.{use};")
+            continue
+        text += f"uniform {kind} u_{name};\n"
+        if use == "texture":
+            text += f"uniform sampler2D u_{name}_texture;\n"
+            value += f" * texture(u_{name}_texture, {at.uv}).{channels}"
+        if declared[name].base and plan.vertex_colours:
+            value += f" * {at.colour}.rgb"
+        body.append(f"    m.{name} = {value};")
+    return text + f"\n{struct} material() {{\n    {struct} m;\n" + "\n".join(body) + "\n    return m;\n}\n"
+
+
+def _frame(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
+    text = '#include "lib/frame.glsl"\n#include "lib/unit.glsl"\n'
+    if plan.normal_map:
+        text += '#include "lib/normal_map.glsl"\nuniform sampler2D u_normal_map;\nuniform float u_normal_scale;\n'
+    elif plan.tangents:
+        text += '#include "lib/tangent_frame.glsl"\n'
+    text += "\n// side: -1 turns the normal over.\nFrame frame(float side) {\n"
+    if plan.normal_map:
+        sample = f"texture(u_normal_map, {at.uv}).xyz"
+        text += f"    return mapped_frame({at.normal}, {at.tangent}, side, {sample}, u_normal_scale);\n"
+    elif plan.tangents:
+        text += f"    return tangent_frame({at.normal}, {at.tangent}, side);\n"
+    else:
+        text += f"    return Frame(side * unit({at.normal}), vec3(0.0), vec3(0.0));\n"
+    return text + "}\n"
+
+
+def _loop(group: LightGroup) -> str:
+    """c += what the lights of a group add."""
+    array = f"u_{group.key}"
+    end = str(group.count) if group.count else f"{array}_count"
+    one = group.count == 1
+    light = f"{array}[{0 if one else 'i'}]"
+    falloff = group.falloff != "none"
+    inner = [f"e = illuminate({light}, p, l);"]
+    if falloff:
+        name = {"1/r": "falloff_inverse", "1/r^2": "falloff_inverse_square"}[group.falloff]
+        inner.append(f"e *= {name}({light}.position - p, {light}.r_min);")
+    inner.append("c += e * brdf_cos(m, f, l, v);")
+    if one:
+        return "".join(f"    {line}\n" for line in inner)
+    return f"    for (int i = 0; i < {end}; ++i) {{\n" + "".join(f"        {line}\n" for line in inner) + "    }\n"
+
+
+def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
+    """Everything up to `vec3 radiance(float side)`: what the surface shows to the viewer, linear."""
+    text = at.declarations
+    if not (plan.directed or plan.ambient):
+        return text + "\n// No light reaches it.\nvec3 radiance(float side) {\n    return vec3(0.0);\n}\n"
+    text += _material(plan, at)
+    if plan.ambient:
+        text += '#include "light/ambient.glsl"\nuniform AmbientLight u_ambient;\n'
+    ambient = "illuminate(u_ambient) * ambient_reflectance(m)" if plan.ambient else "vec3(0.0)"
+    if not plan.directed:
+        return (
+            text
+            + f"\nvec3 radiance(float side) {{\n    {BRDFS.class_name(plan.brdf)} m = material();\n    return {ambient};\n}}\n"
+        )
+    text += _frame(plan, at) + f'#include "viewer/{plan.viewer}.glsl"\n#include "lib/horizon.glsl"\n'
+    for group in plan.lights:
+        struct = LIGHTS.class_name(group.type)
+        text += f'#include "light/{group.type}.glsl"\n'
+        if group.falloff != "none":
+            text += f'#include "falloff/{ {"1/r": "inverse", "1/r^2": "inverse_square"}[group.falloff] }.glsl"\n'
+        if group.count:
+            text += f"uniform {struct} u_{group.key}[{group.count}];\n"
+        else:
+            text += f"layout(std140) uniform {group.key}_page {{\n    {struct} u_{group.key}[{PAGE}];\n}};\n"
+            text += f"uniform int u_{group.key}_count;\n"
+    position = at.position if plan.positions else "vec3(0.0)"
+    text += f"\nvec3 radiance(float side) {{\n    {BRDFS.class_name(plan.brdf)} m = material();\n    Frame f = frame(side);\n"
+    text += f"    vec3 p = {position};\n    vec3 v = above_horizon(viewer(p), f.n);\n    vec3 c = {ambient};\n    vec3 l, e;\n"
+    text += "".join(map(_loop, plan.lights)) + "    return c;\n}\n"
+    if plan.rate == "flat" and plan.both_sides:
+        text += f"\nbool faces_viewer() {{\n    return dot({at.normal}, viewer({position})) >= 0.0;\n}}\n"
+    return text
+
+
+def _alpha_inputs(plan: ProgramPlan, direction: str) -> str:
+    """What the fragment stage of a per-vertex or per-face program asks of the vertex stage beside its colour."""
+    names = ["uv"] * bool(plan.alpha_from) + ["colour"] * (plan.vertex_colours and plan.alpha != "opaque")
+    text = "".join(f"{direction} {TYPES[name]} v_{name};\n" for name in names)
+    if direction == "in":
+        return text
+    declared = _wanted(plan)
+    attributes = "".join(f"in {TYPES[name]} a_{name};\n" for name in names if name not in declared)
+    body = "".join(f"    v_{name} = a_{name};\n" for name in names)
+    return attributes + text + f"\nvoid interpolate() {{\n{body}}}\n"
+
+
+def _alpha(plan: ProgramPlan) -> str:
+    """`float alpha()`: opacity; a cut-out discards."""
+    if plan.alpha == "opaque":
+        return "\nfloat alpha() {\n    return 1.0;\n}\n"
+    text, value = "uniform float u_alpha;\n", "u_alpha"
+    if plan.alpha_from:
+        if plan.rate != "phong" or (plan.alpha_from, "texture") not in plan.parameters:
+            text += f"uniform sampler2D u_{plan.alpha_from}_texture;\n"
+        value += f" * texture(u_{plan.alpha_from}_texture, v_uv).a"
+    if plan.vertex_colours:
+        value += " * v_colour.a"
+    if plan.alpha == "blend":
+        return text + f"\nfloat alpha() {{\n    return {value};\n}}\n"
+    text += "uniform float u_alpha_cutoff;\n"
+    return text + f"\nfloat alpha() {{\n    if ({value} < u_alpha_cutoff)\n        discard;\n    return 1.0;\n}}\n"

@@ -1,0 +1,39 @@
+"""Texture: a picture that gives a material's parameter its value from place to place."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Field
+
+from glshade.document import Document, File, Finite, Triple
+
+WrapMode = Literal["repeat", "clamp", "mirror"]
+
+
+def _pair(value: Any) -> Any:
+    return (value, value) if isinstance(value, str) else value
+
+
+class Texture(Document):
+    """A picture file, multiplied by `factor`. v = 0 is the picture's bottom row."""
+
+    texture: File = Field(description="picture file")
+    factor: Triple = Field((1.0, 1.0, 1.0), description="multiplies the picture's linear values")
+    encoding: Literal["auto", "srgb", "linear"] = Field(
+        "auto",
+        description="how the file's numbers are encoded; auto: sRGB for 8-bit colours, linear for everything else",
+    )
+    wrap: Annotated[tuple[WrapMode, WrapMode], BeforeValidator(_pair)] = Field(
+        ("repeat", "repeat"), description="what lies outside [0, 1], along u and along v"
+    )
+
+
+class NormalMap(Document):
+    """Tangent-space normals: x along the tangent (u), y along the bitangent (v), z along the normal; n = 2 rgb - 1."""
+
+    texture: File = Field(description="picture file, linear")
+    scale: Finite = Field(1.0, description="multiplies x and y")
+    wrap: Annotated[tuple[WrapMode, WrapMode], BeforeValidator(_pair)] = Field(
+        ("repeat", "repeat"), description="what lies outside [0, 1], along u and along v"
+    )

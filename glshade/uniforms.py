@@ -1,0 +1,154 @@
+"""Uniforms: the float32 values that a program is given, by GLSL name.
+
+Everything is computed in float64 and rounded once, here. The reference renderer starts from the same rounded values, so
+that the two renderers share their inputs and nothing else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glshade.assembly import Assembly, Instance
+from glshade.lights import LIGHTS, Light
+from glshade.plan import LightGroup, ProgramPlan
+from glshade.texture import Texture
+
+Array = NDArray[np.float64]
+Values = dict[str, NDArray[np.float32]]
+
+
+def rounded(value: Any) -> NDArray[np.float32]:
+    """float32; what is too large for it becomes infinite, and is refused where it matters."""
+    with np.errstate(over="ignore"):
+        return np.asarray(value, dtype=np.float64).astype(np.float32)
+
+
+def object_uniforms(plan: ProgramPlan, instance: Instance, eye: Array) -> Values:
+    """What differs from object to object: its place relative to the eye, and its material."""
+    world = instance.world_from_object
+    relative = world.copy()
+    relative[:3, 3] -= eye
+    values: dict[str, Any] = {"u_world_from_object": relative}
+    if plan.directed:
+        values["u_normal_from_object"] = normal_matrix(world[:3, :3])
+    if plan.tangents:
+        values["u_handedness"] = -1.0 if instance.mirrored else 1.0
+    values.update(material_uniforms(plan, instance.material))
+    return {name: rounded(value) for name, value in values.items()}
+
+
+def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
+    """The parameters that the program asks for; a texture's is its factor."""
+    values: dict[str, Any] = {}
+    for name, use in plan.parameters:
+        value = getattr(material, name)
+        if use == "texture":
+            values[f"u_{name}"] = value.factor if type(material).is_colour(name) else value.factor[0]
+        elif use == "uniform":
+            values[f"u_{name}"] = value
+    if plan.normal_map:
+        values["u_normal_scale"] = material.normal_map.scale
+    if plan.alpha != "opaque":
+        values["u_alpha"] = material.alpha
+    if plan.alpha == "mask":
+        values["u_alpha_cutoff"] = material.alpha_cutoff
+    return values
+
+
+def textures(plan: ProgramPlan, material: Any) -> dict[str, Any]:
+    """sampler name -> Texture or NormalMap."""
+    found = {f"u_{name}_texture": getattr(material, name) for name in plan.textured}
+    if plan.alpha_from:
+        found[f"u_{plan.alpha_from}_texture"] = getattr(material, plan.alpha_from)
+    if plan.normal_map:
+        found["u_normal_map"] = material.normal_map
+    return {name: value for name, value in found.items() if isinstance(value, Texture) or name == "u_normal_map"}
+
+
+def normal_matrix(linear: Array) -> Array:
+    """(3, 3): the direction of the inverse transpose, as the cofactor matrix over its largest entry.
+
+    The sign of the determinant keeps normals on the outside of mirrored objects. Scaled first, so that 1e-200 does not vanish.
+    """
+    scaled = linear / np.abs(linear).max()
+    a, b, c = scaled.T
+    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    sign = math.copysign(1.0, float(np.dot(a, np.cross(b, c))))
+    result: Array = sign * cofactors / np.abs(cofactors).max()
+    return result
+
+
+def light_values(light: Light, eye: Array, exposure: float) -> dict[str, NDArray[np.float32]]:
+    """The GLSL struct's fields. The intensity comes with exposure, and with the pi of pi (f cos) I."""
+    values = light.uniforms(eye)
+    gain = 2.0**exposure * (1.0 if light.omnidirectional else math.pi)
+    values["intensity"] = values["intensity"] * gain
+    return {name: rounded(value) for name, value in values.items()}
+
+
+def grouped(assembly: Assembly, chosen: tuple[int, ...]) -> Mapping[tuple[str, str], list[Light]]:
+    """(type, falloff) -> lights, of the chosen that have a direction."""
+    groups: dict[tuple[str, str], list[Light]] = {}
+    for index in chosen:
+        light = assembly.lights[index]
+        if not light.omnidirectional:
+            groups.setdefault((light.type, getattr(light, "falloff", "none")), []).append(light)
+    return groups
+
+
+def ambient_intensity(assembly: Assembly, chosen: tuple[int, ...], exposure: float) -> Array:
+    """(3,) float64: ambient lights add up before they are rounded."""
+    total = np.zeros(3)
+    for index in chosen:
+        light = assembly.lights[index]
+        if light.omnidirectional:
+            total += light.uniforms(assembly.view.eye)["intensity"] * 2.0**exposure
+    return total
+
+
+def light_uniforms(plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...], exposure: float) -> Values:
+    """The lights that are plain uniforms: ambient, and the groups that are counted exactly."""
+    values: Values = {}
+    if plan.ambient:
+        values["u_ambient.intensity"] = rounded(ambient_intensity(assembly, chosen, exposure))
+    groups = grouped(assembly, chosen)
+    for group in plan.lights:
+        if group.count:
+            for index, light in enumerate(groups[group.type, group.falloff]):
+                for name, value in light_values(light, assembly.view.eye, exposure).items():
+                    if name != "r_min" or group.falloff != "none":
+                        values[f"u_{group.key}[{index}].{name}"] = value
+    return values
+
+
+def std140(type_name: str) -> np.dtype[np.void]:
+    """The layout of a light's struct in a uniform block: vec3 on 16 bytes, float on 4, the whole rounded up to 16."""
+    fields = LIGHTS[type_name].model_validate({"type": type_name, **_anywhere(type_name)}).uniforms(np.zeros(3))
+    names, formats, offsets, offset = [], [], [], 0
+    for name, value in fields.items():
+        vector = np.size(value) == 3
+        offset = -(-offset // 16) * 16 if vector else offset
+        names.append(name)
+        formats.append("3f4" if vector else "f4")
+        offsets.append(offset)
+        offset += 12 if vector else 4
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": -(-offset // 16) * 16})
+
+
+def _anywhere(type_name: str) -> dict[str, Any]:
+    return {"position": (0, 0, 0)} if "position" in LIGHTS[type_name].model_fields else {}
+
+
+def light_pages(group: LightGroup, lights: list[Light], eye: Array, exposure: float, page: int) -> list[NDArray[np.void]]:
+    """The lights of a large group as std140 records, at most `page` a piece."""
+    layout = std140(group.type)
+    records = np.zeros(len(lights), dtype=layout)
+    for index, light in enumerate(lights):
+        for name, value in light_values(light, eye, exposure).items():
+            records[name][index] = value
+    return [records[start : start + page] for start in range(0, len(records), page)]

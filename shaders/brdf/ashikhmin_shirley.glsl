@@ -1,0 +1,44 @@
+#include "lib/constants.glsl"
+#include "lib/fresnel.glsl"
+#include "lib/frame.glsl"
+#include "lib/log1m.glsl"
+
+// Ashikhmin and Shirley 2000, eqs. 1-5, times n.l. The exponent has (h.u)^2 and (h.v)^2, as in the paper; lecture slide 42
+// writes n for h there, which would make it 0 (erratum).
+struct AshikhminShirley {
+    vec3 kd;
+    vec3 ks;
+    float pu;
+    float pv;
+};
+
+vec3 brdf_cos(AshikhminShirley m, Frame f, vec3 l, vec3 v) {
+    float NoL = dot(f.n, l);
+    float NoV = dot(f.n, v);
+    vec3 H = l + v;
+    float H2 = dot(H, H);
+    float inverse_H = inversesqrt(max(H2, 1e-12));
+    float hu = dot(f.t, H) * inverse_H;
+    float hv = dot(f.b, H) * inverse_H;
+    float LoH = min(0.5 * H2 * inverse_H, 1.0);  // l.h = |H| / 2
+    // (n.h)^((pu hu^2 + pv hv^2) / (1 - (n.h)^2)) with sin^2 = hu^2 + hv^2, and log(n.h) = log(1 - sin^2) / 2: the
+    // division cancels, so h = n is no longer 0/0. Past sin^2 = 1/4 the plain logarithm has its digits.
+    float sin2 = hu * hu + hv * hv;
+    float NoH = (NoL + NoV) * inverse_H;
+    float log_ratio = sin2 < 0.25 ? 0.5 * log1m_over(sin2) : log(NoH) / sin2;
+    float lobe = exp((m.pu * hu * hu + m.pv * hv * hv) * log_ratio);
+    // What is not finite here (H = 0, a direction below the horizon) is never selected below.
+    float norm = sqrt(m.pu + 1.0) * sqrt(m.pv + 1.0) * (0.125 * INV_PI);
+    vec3 specular = f_schlick(m.ks, LoH) * (norm * lobe * NoL / (LoH * max(NoL, NoV)));
+    // 1 - (1 - x/2)^5 by its factors, so that small cosines are not lost in the difference from 1.
+    float a = 1.0 - 0.5 * NoL;
+    float b = 1.0 - 0.5 * NoV;
+    float dl = 0.5 * NoL * (1.0 + a * (1.0 + a * (1.0 + a * (1.0 + a))));
+    float dv = 0.5 * NoV * (1.0 + b * (1.0 + b * (1.0 + b * (1.0 + b))));
+    vec3 diffuse = m.kd * (1.0 - m.ks) * (28.0 / 23.0 * INV_PI * dl * dv * NoL);
+    return NoL > 0.0 && NoV > 0.0 ? diffuse + (H2 > 1e-12 ? specular : vec3(0.0)) : vec3(0.0);
+}
+
+vec3 ambient_reflectance(AshikhminShirley m) {
+    return m.kd;
+}

@@ -1,0 +1,16 @@
+#include "lib/constants.glsl"
+#include "lib/frame.glsl"
+
+// Ideal diffuse (lecture slides 13-15): kd/pi cos, one-sided.
+struct Lambert {
+    vec3 kd;
+};
+
+vec3 brdf_cos(Lambert m, Frame f, vec3 l, vec3 v) {
+    float NoL = dot(f.n, l);
+    return NoL > 0.0 && dot(f.n, v) > 0.0 ? m.kd * (INV_PI * NoL) : vec3(0.0);
+}
+
+vec3 ambient_reflectance(Lambert m) {
+    return m.kd;
+}

@@ -1,0 +1,10 @@
+#version 330 core
+#include <surface>
+#include <output>
+
+flat in vec3 v_radiance;
+out vec4 o_colour;
+
+void main() {
+    o_colour = encode(v_radiance, alpha());
+}

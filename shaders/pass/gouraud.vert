@@ -1,0 +1,12 @@
+#version 330 core
+// Gouraud shading (lecture slide 60): the model is evaluated at every vertex, and its colours are interpolated.
+#include "lib/clip.glsl"
+#include <surface>
+
+out vec3 v_radiance;
+
+void main() {
+    interpolate();
+    v_radiance = radiance(1.0);
+    gl_Position = clip_position();
+}

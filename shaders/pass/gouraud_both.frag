@@ -1,0 +1,11 @@
+#version 330 core
+#include <surface>
+#include <output>
+
+in vec3 v_front;
+in vec3 v_back;
+out vec4 o_colour;
+
+void main() {
+    o_colour = encode(gl_FrontFacing ? v_front : v_back, alpha());
+}
