@@ -59,7 +59,8 @@ class View:
     @property
     def toward_viewer(self) -> Array:
         """(3,): v of an orthographic view."""
-        return self.axes[2]
+        backward: Array = self.axes[2]
+        return backward
 
     def depth(self, points: Array) -> Array:
         """How far in front of the eye plane the world points (..., 3) are."""

@@ -73,7 +73,7 @@ class Image:
         if self.pixels.dtype == np.float32:
             return self
         c = self.pixels.astype(np.float32) / 255
-        rgb = srgb_to_linear(c[..., :3]) if self.encoding == "srgb" else c[..., :3]
+        rgb: NDArray[Any] = srgb_to_linear(c[..., :3]) if self.encoding == "srgb" else c[..., :3]
         c = np.concatenate([rgb * c[..., 3:], c[..., 3:]], axis=2) if c.shape[2] == 4 else rgb
         return Image(c, "linear", self.attributes)
 
@@ -85,8 +85,9 @@ class Image:
         if self.channels == "RGBA":
             alpha = self.pixels[..., 3:]
             rgb = np.divide(rgb, alpha, out=np.zeros_like(rgb), where=alpha > 0)
-        rgb = linear_to_srgb(rgb) if encoding == "srgb" else np.clip(rgb, 0, 1)
-        c = np.concatenate([rgb, np.clip(alpha, 0, 1)], axis=2) if self.channels == "RGBA" else rgb
+        c: NDArray[Any] = linear_to_srgb(rgb) if encoding == "srgb" else np.clip(rgb, 0, 1)
+        if self.channels == "RGBA":
+            c = np.concatenate([c, np.clip(alpha, 0, 1)], axis=2)
         return Image((c * 255 + 0.5).astype(np.uint8), encoding, self.attributes)
 
     def save(self, path: str | Path) -> None:

@@ -30,7 +30,8 @@ class AshikhminShirley(Brdf):
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         h, length2 = half_vector(l, v)
         NoL, NoV, NoH = l[..., 2], v[..., 2], h[..., 2]
-        LoH = np.clip(np.sum(l * h, axis=-1), 0.0, 1.0)
+        # l.h = |H| / 2 for unit vectors; as a dot product it would feel the rounding of |l| and |v| near l = -v.
+        LoH = np.minimum(0.5 * np.sqrt(length2), 1.0)
         sin2 = h[..., 0] ** 2 + h[..., 1] ** 2
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
             # log(n.h) / sin^2, by its limit -1/2 at h = n.

@@ -12,7 +12,8 @@ float cospow(vec3 a, vec3 b, float p) {
     float z = t / (2.0 + t);
     float z2 = z * z;
     // 2 / ((2 k + 1) ln 2)
-    float log2_c = float(e) + z * (2.885390082 + z2 * (0.9617966940 + z2 * (0.5770780164 + z2 * (0.4121985831 + z2 * 0.3205988980))));
+    float series = 2.885390082 + z2 * (0.9617966940 + z2 * (0.5770780164 + z2 * (0.4121985831 + z2 * 0.3205988980)));
+    float log2_c = float(e) + z * series;
     // cos^0 is 1 on the whole upper hemisphere.
     return c > 0.0 ? exp2(p * log2_c) : 0.0;
 }
