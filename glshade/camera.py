@@ -1,7 +1,5 @@
 """Camera: where the viewer stands, and the matrices that follow. All in float64; rounding comes with the upload."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -216,7 +214,7 @@ class Orthographic(Camera):
     """A viewer at infinity: v is constant (lecture slide 49)."""
 
     type: Literal["orthographic"] = "orthographic"
-    height: Annotated[float, Field(gt=0)] | None = Field(
+    height: Annotated[Finite, Field(gt=0)] | None = Field(
         None, description="what the picture's height spans [scene units]; left out: the whole scene"
     )
 

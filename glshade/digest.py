@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from glshade.document import Document
 from glshade.mesh import Mesh
 from glshade.scene import Scene
 
@@ -19,11 +20,13 @@ def digest(scene: Scene) -> str:
             return hashlib.sha256(value.read_bytes()).hexdigest()
         if isinstance(value, Mesh):
             return value.digest
+        if isinstance(value, Document):
+            return {key: content(getattr(value, key)) for key in type(value).model_fields}
         if isinstance(value, dict):
             return {key: content(item) for key, item in value.items()}
         if isinstance(value, tuple | list):
             return [content(item) for item in value]
         return value
 
-    text = json.dumps(content(scene.model_dump()), sort_keys=True, separators=(",", ":"))
+    text = json.dumps(content(scene), sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()

@@ -3,8 +3,6 @@
 pydantic's own messages speak to programmers; these speak to the author of a scene: what is allowed, and the nearest name.
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -21,12 +19,26 @@ from pydantic import (
     ModelWrapValidatorHandler,
     ValidationError,
     ValidationInfo,
+    WithJsonSchema,
+    field_validator,
     model_validator,
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
 # Internal union branches that pydantic puts in the path of an error; the author of a scene never wrote them.
 BRANCHES = frozenset({"value", "texture-table", "one", "pair", "shorthand", "table"})
+
+
+# What pydantic calls "a valid dictionary or instance of Film", in the words of a scene file.
+KINDS = {
+    "model_type": "must be a table",
+    "model_attributes_type": "must be a table",
+    "dict_type": "must be a table",
+    "tuple_type": "must be a list",
+    "list_type": "must be a list",
+    "string_type": "must be a string",
+    "int_from_float": "must be a whole number",
+}
 
 
 def nearest(name: object, names: Iterable[str]) -> str:
@@ -37,8 +49,14 @@ def nearest(name: object, names: Iterable[str]) -> str:
 
 
 def fault(message: str) -> PydanticCustomError:
-    """An error with exactly this message: braces are doubled, because pydantic formats the template."""
-    return PydanticCustomError("scene", message.replace("{", "{{").replace("}", "}}"))
+    """An error with exactly this message: without a context, pydantic leaves braces alone."""
+    return PydanticCustomError("scene", message)  # type: ignore[arg-type]
+
+
+def shown(value: object) -> str:
+    """`, not 3`, unless it would drown the message."""
+    text = repr(value)
+    return "" if len(text) > 40 else f", not {text}"
 
 
 def _speak(error: Any, fields: Iterable[str]) -> str:
@@ -47,22 +65,34 @@ def _speak(error: Any, fields: Iterable[str]) -> str:
     if kind == "extra_forbidden":
         return "unknown key" + nearest(error["loc"][-1], fields)
     if kind == "missing":
-        return "is required"
+        return "is missing: the list is too short" if isinstance(error["loc"][-1], int) else "is required"
+    if kind == "too_long":
+        return f"must be a list of {context['max_length']}, not of {context['actual_length']}"
     if kind == "literal_error":
         return f"{given!r} is not one of {context['expected']}"
     if kind == "finite_number":
         return f"{given!r} is not a finite number"
     if kind in {"value_error", "assertion_error"}:
         return str(context.get("error", error["msg"]))
-    message = str(error["msg"]).replace("Input should be", "must be")
-    shown = repr(given)
-    return message if len(shown) > 40 or kind == "scene" else f"{message}, not {shown}"
+    if kind == "scene":
+        return str(error["msg"])
+    message = KINDS.get(kind) or str(error["msg"]).replace("Input should be", "must be")
+    return message + shown(given)
 
 
 class Document(BaseModel):
     """A table of the scene file: unknown keys are faults, values are frozen, numbers are finite."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
+
+    @field_validator("*", mode="before")
+    @classmethod
+    def _as_written(cls, value: Any, info: ValidationInfo) -> Any:
+        """A number is written as a number, and a truth value as true or false."""
+        wanted = cls.model_fields[info.field_name].annotation if info.field_name in cls.model_fields else None
+        if wanted is bool and not isinstance(value, bool):
+            raise fault("must be true or false" + shown(value))
+        return number(value) if wanted in (int, float) else value
 
     @model_validator(mode="wrap")
     @classmethod
@@ -106,12 +136,14 @@ class Chosen:
         if self.shorthand and isinstance(data, str):
             data = {self.key: data}
         if not isinstance(data, Mapping):
-            raise fault(f"must be a table with the key {self.key!r}, not {data!r}")
+            raise fault(f"must be a table with the key {self.key!r}" + shown(data))
         name = data.get(self.key, self.default)
         if name is None:
             raise fault(f"lacks the key {self.key!r}" + nearest("", self.models))
         if not isinstance(name, str) or name not in self.models:
-            raise fault(f"unknown {self.key} {name!r}" + nearest(name, self.models))
+            unknown = fault(f"unknown {self.key} {name!r}" + nearest(name, self.models))
+            place = InitErrorDetails(type=unknown, loc=(self.key,), input=name)
+            raise ValidationError.from_exception_data(self.key, [place])
         return self.models[name].model_validate({**data, self.key: name}, context=info.context)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
@@ -124,16 +156,28 @@ class Chosen:
 
     def __get_pydantic_json_schema__(self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         choices = [handler(model.__pydantic_core_schema__) for model in self.models.values()]
+        for name, choice in zip(self.models, choices, strict=True):
+            if name != self.default:
+                # A definition is shared, and takes the requirement with it; the key is what tells the choices apart.
+                table = handler.resolve_ref_schema(choice)
+                table["required"] = sorted({*table.get("required", ()), self.key})
         if self.shorthand:
             choices.append({"enum": list(self.models)})
         return {"anyOf": choices}
 
 
+def number(value: Any) -> Any:
+    """Refuses what pydantic would turn into a number: "3", true."""
+    if isinstance(value, str | bool):
+        raise fault("must be a number" + shown(value))
+    return value
+
+
 def _triple(value: Any) -> Any:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return (value,) * 3
-    if isinstance(value, str | bool) or not hasattr(value, "__len__") or len(value) != 3:
-        raise fault(f"must be three numbers, or one that stands for three, not {value!r}")
+    if isinstance(value, str | bool | Mapping) or not hasattr(value, "__len__") or len(value) != 3:
+        raise fault("must be three numbers, or one that stands for three" + shown(value))
     return tuple(value)
 
 
@@ -148,10 +192,15 @@ def _resolve(path: Path, info: ValidationInfo) -> Path:
     return path
 
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False), BeforeValidator(number)]
 Vector3 = tuple[Finite, Finite, Finite]
+_NUMBER = {"type": "number"}
 # One number stands for three equal ones.
-Triple = Annotated[Vector3, BeforeValidator(_triple)]
+Triple = Annotated[
+    Vector3,
+    BeforeValidator(_triple),
+    WithJsonSchema({"anyOf": [_NUMBER, {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}]}),
+]
 # A file that exists; relative paths start at the folder of the scene file.
 File = Annotated[Path, AfterValidator(_resolve)]
 

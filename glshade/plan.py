@@ -12,28 +12,52 @@ from typing import Literal
 
 from glshade.assembly import Assembly, Instance, assemble
 from glshade.brdfs import BRDFS
-from glshade.lights import Falloff
+from glshade.lights import Falloff, Light
 from glshade.scene import Rate, Scene
 from glshade.texture import Texture
+
+# A uniform costs time in every pixel on a software driver, so a colour whose three channels are equal is one number.
+
+
+def is_grey(colour: tuple[float, float, float]) -> bool:
+    """Whether the three channels are equal."""
+    return colour[0] == colour[1] == colour[2]
+
+
+def is_white(light: Light) -> bool:
+    """Whether the light is grey."""
+    return is_grey(light.colour)
+
+
+def kind(light: Light) -> tuple[str, Falloff]:
+    """(type, falloff) of a light that has a direction."""
+    return light.type, getattr(light, "falloff", "none")
+
 
 # Up to here the count of lights is in the program, and its loop has a constant end; above, a uniform block holds a page.
 EXACT_LIGHTS = 8
 
-Use = Literal["uniform", "texture", "unused"]
+Use = Literal["uniform", "grey", "texture", "unused"]
 
 
 @dataclass(frozen=True, order=True)
 class LightGroup:
-    """Lights of one kind. count 0: a page of a uniform block, counted when drawn."""
+    """Lights of one kind. white: their intensity is one number. count 0: a page of a uniform block, counted when drawn."""
 
     type: str
     falloff: Falloff
+    white: bool
     count: int
 
     @property
     def key(self) -> str:
-        """In identifiers: `point_inverse_square`."""
-        return self.type + {"none": "", "1/r": "_inverse", "1/r^2": "_inverse_square"}[self.falloff]
+        """In identifiers: `point_inverse_square`, `white_directional`."""
+        falloff = {"none": "", "1/r": "_inverse", "1/r^2": "_inverse_square"}[self.falloff]
+        return "white_" * self.white + self.type + falloff
+
+    def holds(self, light: Light) -> bool:
+        """Whether the light is one of them."""
+        return (self.type, self.falloff) == kind(light) and (self.count == 0 or self.white == is_white(light))
 
 
 @dataclass(frozen=True)
@@ -49,6 +73,7 @@ class ProgramPlan:
     parameters: tuple[tuple[str, str], ...]
     lights: tuple[LightGroup, ...]
     ambient: bool
+    ambient_white: bool
     viewer: Literal["perspective", "orthographic"]
     both_sides: bool
     alpha: Literal["opaque", "mask", "blend"]
@@ -112,15 +137,20 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
     """The program for one instance, in canonical form: what cannot show is left out."""
     reached = [assembly.lights[i] for i in instance.lights]
     ambient = any(light.omnidirectional for light in reached)
-    kinds: Counter[tuple[str, Falloff]] = Counter(
-        (light.type, getattr(light, "falloff", "none")) for light in reached if not light.omnidirectional
-    )
+    kinds = Counter(kind(light) for light in reached if not light.omnidirectional)
+    white = Counter(kind(light) for light in reached if not light.omnidirectional and is_white(light))
     material = instance.material
     model = BRDFS[material.brdf]
     # A model that answers only to ambient light never asks for another.
     if all(declared.lobe == "ambient" for declared in model.parameters().values()):
         kinds.clear()
-    groups = tuple(sorted(LightGroup(kind, falloff, n if n <= EXACT_LIGHTS else 0) for (kind, falloff), n in kinds.items()))
+    groups = []
+    for (name, falloff), count in sorted(kinds.items()):
+        if count > EXACT_LIGHTS:
+            groups.append(LightGroup(name, falloff, False, 0))
+            continue
+        shares = {False: count - white[name, falloff], True: white[name, falloff]}
+        groups += [LightGroup(name, falloff, grey, share) for grey, share in shares.items() if share]
     parameters = []
     for name, declared in model.parameters().items():
         value = getattr(material, name)
@@ -130,7 +160,8 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         elif value is None and declared.same_as is not None:
             use = declared.same_as
         else:
-            use = "texture" if isinstance(value, Texture) else "uniform"
+            grey = model.is_colour(name) and not isinstance(value, Texture) and is_grey(value)
+            use = "texture" if isinstance(value, Texture) else "grey" if grey else "uniform"
         parameters.append((name, use))
     base = next((name for name, declared in model.parameters().items() if declared.base), None)
     carries_alpha = material.alpha_mode != "opaque" and base is not None and isinstance(getattr(material, base), Texture)
@@ -138,8 +169,9 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         rate=instance.rate,
         brdf=material.brdf,
         parameters=tuple(parameters),
-        lights=groups,
+        lights=tuple(groups),
         ambient=ambient,
+        ambient_white=ambient and all(is_white(light) for light in reached if light.omnidirectional),
         viewer="perspective" if assembly.view.perspective else "orthographic",
         both_sides=instance.back_faces and bool(groups),
         alpha=material.alpha_mode,
@@ -179,11 +211,7 @@ def plan(assembly: Assembly, encoding: Literal["linear", "srgb"]) -> Plan:
         if program.alpha != "opaque":
             reasons.setdefault(f"alpha {program.alpha}", instance.name)
         for group in program.lights:
-            first = next(
-                i
-                for i in instance.lights
-                if (assembly.lights[i].type, getattr(assembly.lights[i], "falloff", "none")) == (group.type, group.falloff)
-            )
+            first = next(i for i in instance.lights if group.holds(assembly.lights[i]))
             reasons.setdefault(f"light {group.key}", assembly.lights[first].name or f"lights[{first}]")
         if program.ambient:
             first = next(i for i in instance.lights if assembly.lights[i].omnidirectional)

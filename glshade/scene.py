@@ -1,7 +1,5 @@
 """Scene: everything a picture is made of. These models are the file format, its JSON schema and the Python interface."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
@@ -13,7 +11,9 @@ from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Skip
 
 from glshade.brdfs import BRDFS, Brdf
 from glshade.camera import CAMERAS, Camera, Matrix4, Perspective, affine
-from glshade.document import Chosen, Document, File, Finite, Triple, Vector3, fault, nearest
+from glshade.document import Chosen, Document, File, Finite, Triple, Vector3, fault, nearest, number
+from glshade.errors import AssetError
+from glshade.image import srgb_to_linear
 from glshade.lights import LIGHTS, Light
 from glshade.mesh import Mesh
 from glshade.shape import SHAPES, Shape
@@ -24,7 +24,7 @@ Normals = Literal["auto", "face", "smooth"]
 Sides = Literal["auto", "front", "both"]
 # The largest side of a picture: 2^17 pixels of 16 bytes in one row are 2 MiB, still a file that other programs open.
 LARGEST_SIDE = 131072
-Side = Annotated[int, Field(ge=1, le=LARGEST_SIDE)]
+Side = Annotated[int, Field(ge=1, le=LARGEST_SIDE), BeforeValidator(number)]
 
 
 def _scale(value: Vector3) -> Vector3:
@@ -68,17 +68,26 @@ def _mesh(value: Any) -> Any:
     """A mesh made in Python: a Mesh, trimesh's Trimesh (anything with vertices and faces), or (vertices, faces)."""
     if isinstance(value, Mesh | str | Path):
         return value
-    normals = None
+    normals = uvs = colours = None
     if hasattr(value, "vertices") and hasattr(value, "faces"):
         vertices, faces = value.vertices, value.faces
         # trimesh computes normals on demand; only those it was given are the mesh's own.
         if "vertex_normals" in getattr(value, "_cache", ()):
             normals = value.vertex_normals
+        visual = getattr(value, "visual", None)
+        uvs = getattr(visual, "uv", None)
+        if getattr(visual, "kind", None) == "vertex":
+            # trimesh holds bytes, sRGB-encoded by custom.
+            encoded = np.asarray(visual.vertex_colors) / 255
+            colours = np.column_stack([srgb_to_linear(encoded[:, :3]), encoded[:, 3]])
     elif isinstance(value, tuple | list) and len(value) == 2:
         vertices, faces = value
     else:
         raise fault("must be the path of a mesh file (or, in Python, a Mesh, a trimesh or a pair of vertices and faces)")
-    return Mesh.build(np.asarray(vertices, dtype=np.float64), np.asarray(faces), normals=normals)
+    try:
+        return Mesh.build(np.asarray(vertices, dtype=np.float64), np.asarray(faces), normals, uvs, colours)
+    except AssetError as error:
+        raise fault("; ".join(error.problems)) from None
 
 
 def _mesh_branch(value: Any) -> str:
@@ -86,8 +95,9 @@ def _mesh_branch(value: Any) -> str:
 
 
 MeshSource = Annotated[
-    Annotated[SkipValidation[Mesh], Tag("value"), WithJsonSchema({"type": "string"})] | Annotated[File, Tag("texture-table")],
+    Annotated[SkipValidation[Mesh], Tag("value")] | Annotated[File, Tag("texture-table")],
     Discriminator(_mesh_branch),
+    WithJsonSchema({"type": "string", "format": "path"}),
 ]
 Material = Annotated[Brdf, Chosen(BRDFS, "brdf")]
 

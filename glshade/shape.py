@@ -1,7 +1,5 @@
 """Shape: a primitive as a scene names it. The meshes themselves are made in primitives.py."""
 
-from __future__ import annotations
-
 from functools import cache
 from typing import Annotated, Literal
 

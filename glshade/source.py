@@ -186,7 +186,9 @@ def _material(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
         if use in declared:
             body.append(f"    m.{name} = m.{use};")
             continue
-        text += f"uniform {kind} u_{name};\n"
+        text += f"uniform {'float' if use == 'grey' else kind} u_{name};\n"
+        if use == "grey":
+            value = f"vec3({value})"
         if use == "texture":
             text += f"uniform sampler2D u_{name}_texture;\n"
             value += f" * texture(u_{name}_texture, {at.uv}).{channels}"
@@ -213,21 +215,48 @@ def _frame(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
     return text + "}\n"
 
 
+def _declared_lights(group: LightGroup) -> str:
+    """The uniforms of a group. Counted lights have one for each field, so that what nobody reads is not there."""
+    struct = LIGHTS.class_name(group.type)
+    if not group.count:
+        page = f"layout(std140) uniform {group.key}_page {{\n    {struct} u_{group.key}[{PAGE}];\n}};\n"
+        return page + f"uniform int u_{group.key}_count;\n"
+    array = "" if group.count == 1 else f"[{group.count}]"
+    return "".join(
+        f"uniform {'float' if name == 'intensity' and group.white else kind} u_{group.key}_{name}{array};\n"
+        for name, kind in LIGHTS[group.type].fields().items()
+        if name != "r_min" or group.falloff != "none"
+    )
+
+
+def _light(group: LightGroup) -> str:
+    """The expression of one light's struct."""
+    if not group.count:
+        return f"u_{group.key}[i]"
+    index = "" if group.count == 1 else "[i]"
+    values = []
+    for name in LIGHTS[group.type].fields():
+        value = f"u_{group.key}_{name}{index}"
+        if name == "r_min" and group.falloff == "none":
+            value = "0.0"
+        values.append(f"vec3({value})" if name == "intensity" and group.white else value)
+    return f"{LIGHTS.class_name(group.type)}({', '.join(values)})"
+
+
 def _loop(group: LightGroup) -> str:
     """c += what the lights of a group add."""
-    array = f"u_{group.key}"
-    end = str(group.count) if group.count else f"{array}_count"
-    one = group.count == 1
-    light = f"{array}[{0 if one else 'i'}]"
-    falloff = group.falloff != "none"
-    inner = [f"e = illuminate({light}, p, l);"]
-    if falloff:
-        name = {"1/r": "falloff_inverse", "1/r^2": "falloff_inverse_square"}[group.falloff]
-        inner.append(f"e *= {name}({light}.position - p, {light}.r_min);")
+    struct = LIGHTS.class_name(group.type)
+    inner = [f"{struct} light = {_light(group)};", "vec3 l;", "vec3 e = illuminate(light, p, l);"]
+    if group.falloff != "none":
+        inner.append(f"e *= falloff_{FALLOFFS[group.falloff]}(light.position - p, light.r_min);")
     inner.append("c += e * brdf_cos(m, f, l, v);")
-    if one:
-        return "".join(f"    {line}\n" for line in inner)
-    return f"    for (int i = 0; i < {end}; ++i) {{\n" + "".join(f"        {line}\n" for line in inner) + "    }\n"
+    body = "".join(f"        {line}\n" for line in inner)
+    head = "" if group.count == 1 else f"for (int i = 0; i < {group.count or f'u_{group.key}_count'}; ++i) "
+    return f"    {head}{{\n{body}    }}\n"
+
+
+# falloff -> its file under falloff/, and the end of its function's name.
+FALLOFFS = {"1/r": "inverse", "1/r^2": "inverse_square"}
 
 
 def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
@@ -237,8 +266,10 @@ def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
         return text + "\n// No light reaches it.\nvec3 radiance(float side) {\n    return vec3(0.0);\n}\n"
     text += _material(plan, at)
     if plan.ambient:
-        text += '#include "light/ambient.glsl"\nuniform AmbientLight u_ambient;\n'
-    ambient = "illuminate(u_ambient) * ambient_reflectance(m)" if plan.ambient else "vec3(0.0)"
+        text += (
+            '#include "light/ambient.glsl"\nuniform ' + ("float" if plan.ambient_white else "vec3") + " u_ambient_intensity;\n"
+        )
+    ambient = "illuminate(AmbientLight(vec3(u_ambient_intensity))) * ambient_reflectance(m)" if plan.ambient else "vec3(0.0)"
     if not plan.directed:
         return (
             text
@@ -246,18 +277,13 @@ def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
         )
     text += _frame(plan, at) + f'#include "viewer/{plan.viewer}.glsl"\n#include "lib/horizon.glsl"\n'
     for group in plan.lights:
-        struct = LIGHTS.class_name(group.type)
         text += f'#include "light/{group.type}.glsl"\n'
         if group.falloff != "none":
-            text += f'#include "falloff/{ {"1/r": "inverse", "1/r^2": "inverse_square"}[group.falloff] }.glsl"\n'
-        if group.count:
-            text += f"uniform {struct} u_{group.key}[{group.count}];\n"
-        else:
-            text += f"layout(std140) uniform {group.key}_page {{\n    {struct} u_{group.key}[{PAGE}];\n}};\n"
-            text += f"uniform int u_{group.key}_count;\n"
+            text += f'#include "falloff/{FALLOFFS[group.falloff]}.glsl"\n'
+        text += _declared_lights(group)
     position = at.position if plan.positions else "vec3(0.0)"
     text += f"\nvec3 radiance(float side) {{\n    {BRDFS.class_name(plan.brdf)} m = material();\n    Frame f = frame(side);\n"
-    text += f"    vec3 p = {position};\n    vec3 v = above_horizon(viewer(p), f.n);\n    vec3 c = {ambient};\n    vec3 l, e;\n"
+    text += f"    vec3 p = {position};\n    vec3 v = above_horizon(viewer(p), f.n);\n    vec3 c = {ambient};\n"
     text += "".join(map(_loop, plan.lights)) + "    return c;\n}\n"
     if plan.rate == "flat" and plan.both_sides:
         text += f"\nbool faces_viewer() {{\n    return dot({at.normal}, viewer({position})) >= 0.0;\n}}\n"

@@ -1,18 +1,25 @@
 """Texture: a picture that gives a material's parameter its value from place to place."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from glshade.document import Document, File, Finite, Triple
 
 WrapMode = Literal["repeat", "clamp", "mirror"]
+_MODE = {"enum": ["repeat", "clamp", "mirror"]}
 
 
 def _pair(value: Any) -> Any:
     return (value, value) if isinstance(value, str) else value
+
+
+# One mode stands for two.
+Wrap = Annotated[
+    tuple[WrapMode, WrapMode],
+    BeforeValidator(_pair),
+    WithJsonSchema({"anyOf": [_MODE, {"type": "array", "items": _MODE, "minItems": 2, "maxItems": 2}]}),
+]
 
 
 class Texture(Document):
@@ -24,9 +31,7 @@ class Texture(Document):
         "auto",
         description="how the file's numbers are encoded; auto: sRGB for 8-bit colours, linear for everything else",
     )
-    wrap: Annotated[tuple[WrapMode, WrapMode], BeforeValidator(_pair)] = Field(
-        ("repeat", "repeat"), description="what lies outside [0, 1], along u and along v"
-    )
+    wrap: Wrap = Field(("repeat", "repeat"), description="what lies outside [0, 1], along u and along v")
 
 
 class NormalMap(Document):
@@ -34,6 +39,4 @@ class NormalMap(Document):
 
     texture: File = Field(description="picture file, linear")
     scale: Finite = Field(1.0, description="multiplies x and y")
-    wrap: Annotated[tuple[WrapMode, WrapMode], BeforeValidator(_pair)] = Field(
-        ("repeat", "repeat"), description="what lies outside [0, 1], along u and along v"
-    )
+    wrap: Wrap = Field(("repeat", "repeat"), description="what lies outside [0, 1], along u and along v")

@@ -49,8 +49,8 @@ def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
         value = getattr(material, name)
         if use == "texture":
             values[f"u_{name}"] = value.factor if type(material).is_colour(name) else value.factor[0]
-        elif use == "uniform":
-            values[f"u_{name}"] = value
+        elif use in ("uniform", "grey"):
+            values[f"u_{name}"] = value if use == "uniform" else value[0]
     if plan.normal_map:
         values["u_normal_scale"] = material.normal_map.scale
     if plan.alpha != "opaque":
@@ -115,33 +115,31 @@ def light_uniforms(plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...
     """The lights that are plain uniforms: ambient, and the groups that are counted exactly."""
     values: Values = {}
     if plan.ambient:
-        values["u_ambient.intensity"] = rounded(ambient_intensity(assembly, chosen, exposure))
-    groups = grouped(assembly, chosen)
+        intensity = ambient_intensity(assembly, chosen, exposure)
+        values["u_ambient_intensity"] = rounded(intensity[0] if plan.ambient_white else intensity)
     for group in plan.lights:
-        if group.count:
-            for index, light in enumerate(groups[group.type, group.falloff]):
-                for name, value in light_values(light, assembly.view.eye, exposure).items():
-                    if name != "r_min" or group.falloff != "none":
-                        values[f"u_{group.key}[{index}].{name}"] = value
+        if not group.count:
+            continue
+        lights = [
+            light_values(assembly.lights[i], assembly.view.eye, exposure) for i in chosen if group.holds(assembly.lights[i])
+        ]
+        for name in lights[0]:
+            value = np.stack([light[name] for light in lights])
+            values[f"u_{group.key}_{name}"] = value[:, 0] if name == "intensity" and group.white else value
     return values
 
 
 def std140(type_name: str) -> np.dtype[np.void]:
     """The layout of a light's struct in a uniform block: vec3 on 16 bytes, float on 4, the whole rounded up to 16."""
-    fields = LIGHTS[type_name].model_validate({"type": type_name, **_anywhere(type_name)}).uniforms(np.zeros(3))
     names, formats, offsets, offset = [], [], [], 0
-    for name, value in fields.items():
-        vector = np.size(value) == 3
+    for name, kind in LIGHTS[type_name].fields().items():
+        vector = kind == "vec3"
         offset = -(-offset // 16) * 16 if vector else offset
         names.append(name)
         formats.append("3f4" if vector else "f4")
         offsets.append(offset)
         offset += 12 if vector else 4
     return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": -(-offset // 16) * 16})
-
-
-def _anywhere(type_name: str) -> dict[str, Any]:
-    return {"position": (0, 0, 0)} if "position" in LIGHTS[type_name].model_fields else {}
 
 
 def light_pages(group: LightGroup, lights: list[Light], eye: Array, exposure: float, page: int) -> list[NDArray[np.void]]:

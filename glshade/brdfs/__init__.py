@@ -4,12 +4,10 @@ A model's class is its entry in the scene file: parameters with default, range, 
 float64: f cos = BRDF times max(n.l, 0) [1/sr], 0 where n.l <= 0 or n.v <= 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -88,7 +86,8 @@ class Brdf(Document):
     @classmethod
     def is_colour(cls, name: str) -> bool:
         """Whether the parameter has three channels."""
-        return "Colour" in str(cls.__annotations__[name])
+        kind = cls.__annotations__[name]
+        return kind == Colour or Colour in get_args(kind)
 
     @field_validator("*", mode="after")
     @classmethod
@@ -103,7 +102,7 @@ class Brdf(Document):
             raise fault(f"must be at most {declared.high:g}, not {max(numbers):g}")
         return value
 
-    def canonical(self, ambient: bool) -> Brdf:
+    def canonical(self, ambient: bool) -> "Brdf":
         """The simplest model with the same value: lobes of weight zero drop out. `ambient`: whether ambient light counts."""
         return self
 

@@ -1,7 +1,5 @@
 """ashikhmin_shirley: an anisotropic Phong model with Fresnel and a diffuse term that keeps the energy."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """blinn_phong: the half-angle variant of phong."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """lambert: ideal diffuse."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """phong: ambient, diffuse and a specular lobe about the mirror direction."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, ClassVar, Literal
 

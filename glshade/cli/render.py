@@ -52,6 +52,8 @@ def command(
     device: int | None,
 ) -> None:
     """Renders SCENE (.toml, .json, or a mesh: .obj .ply .stl .off .glb .gltf) to a picture."""
+    from pydantic import ValidationError
+
     from glshade.image import FLOAT_SUFFIXES, check_suffix
     from glshade.scene import Film
     from glshade.scene_file import load
@@ -62,7 +64,11 @@ def command(
     wanted = {"size": size, "samples": samples and int(samples), "exposure": exposure}
     changes = {key: value for key, value in wanted.items() if value is not None}
     if changes:
-        film = Film.model_validate({**loaded.film.model_dump(), **changes})
+        try:
+            film = Film.model_validate({**loaded.film.model_dump(), **changes})
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            raise click.BadParameter(first["msg"], param_hint=f"'--{first['loc'][0]}'") from None
         loaded = loaded.model_copy(update={"film": film})
     # Only a scene without faults is worth a context.
     from glshade.gl.renderer import Renderer

@@ -61,7 +61,7 @@ def parameter_values(brdf: Brdf) -> dict[str, NDArray[np.float32]]:
     return values
 
 
-def _generated(brdf: Brdf) -> dict[str, str]:
+def generated(brdf: Brdf) -> dict[str, str]:
     """The model's include, its uniforms, and `value(l, v)`."""
     struct = BRDFS.class_name(brdf.brdf)
     text = f'#include "brdf/{brdf.brdf}.glsl"\n'
@@ -77,7 +77,7 @@ def _generated(brdf: Brdf) -> dict[str, str]:
 def _in_vertex_stage(
     context: Context, brdf: Brdf, values: dict[str, NDArray[np.float32]], l: NDArray[Any], v: NDArray[Any]
 ) -> NDArray[np.float32]:
-    source = Source(expand("pass/evaluate.vert", _generated(brdf)), None)
+    source = Source(expand("pass/evaluate.vert", generated(brdf)), None)
     program = Program(context, source, varyings=("v_value",))
     for name, value in values.items():
         program.write(f"u_{name}", value)
@@ -94,7 +94,7 @@ def _in_vertex_stage(
 def _in_fragment_stage(
     context: Context, brdf: Brdf, values: dict[str, NDArray[np.float32]], l: NDArray[Any], v: NDArray[Any]
 ) -> NDArray[np.float32]:
-    source = Source(expand("pass/picture.vert", {}), expand("pass/evaluate.frag", _generated(brdf)))
+    source = Source(expand("pass/picture.vert", {}), expand("pass/evaluate.frag", generated(brdf)))
     program = Program(context, source)
     for name, value in values.items():
         program.write(f"u_{name}", value)

@@ -51,10 +51,13 @@ class Program:
         self.uniforms = tuple(name for name, member in self.members.items() if isinstance(member, moderngl.Uniform))
 
     def write(self, name: str, value: NDArray[np.float32]) -> None:
-        """Sets a float uniform; matrices row by row as NumPy has them. A uniform that the driver dropped is passed over."""
+        """Sets a float uniform or an array of them; a matrix (`u_to_from_from`) is turned to columns, as GL has them.
+
+        A uniform that the driver found unused is passed over.
+        """
         member = self.members.get(name)
         if member is not None:
-            member.write((value.T if value.ndim == 2 else value).tobytes())
+            member.write((value.T if "_from_" in name else value).tobytes())
 
     def set_integer(self, name: str, value: int) -> None:
         """Sets an int or a sampler's unit."""

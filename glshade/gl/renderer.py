@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from glshade import __version__
 from glshade.assembly import Assembly, Instance, assemble
 from glshade.camera import window
+from glshade.clusters import facing
 from glshade.digest import digest
 from glshade.gl.context import Backend, Context, open_context
 from glshade.gl.frame import Frame, Storage
@@ -72,7 +73,7 @@ class Prepared:
     scene: Scene
     assembly: Assembly
     draws: list[Draw]
-    attributes: dict[str, str]
+    attributes: dict[str, str] | None = None
 
 
 class Renderer:
@@ -130,7 +131,7 @@ class Renderer:
                 if not whole:
                     pixels[y : y + size[1], x : x + size[0]] = part
         encoding = film.encoding if on_gpu else "linear"
-        image = Image(pixels[..., :channels], encoding, prepared.attributes)
+        image = Image(pixels[..., :channels], encoding, {} if on_gpu else self._attributes(prepared))
         return image if on_gpu or dtype == "float32" else image.encoded(film.encoding)
 
     def _draw_piece(
@@ -228,7 +229,7 @@ class Renderer:
         kept = self._prepared.get(key)
         if kept is None:
             assembly = assemble(scene, shading)
-            kept = Prepared(scene, assembly, list(self._draws(scene, assembly, encoding)), self._attributes(scene))
+            kept = Prepared(scene, assembly, list(self._draws(scene, assembly, encoding)))
             self._prepared[key] = kept
             if len(self._prepared) > KEPT_SCENES:
                 self._prepared.popitem(last=False)
@@ -273,7 +274,8 @@ class Renderer:
         pages: list[list[tuple[str, moderngl.Buffer, int]]],
     ) -> Iterator[Draw]:
         """The first draw of an instance, and one more for every further page of lights."""
-        order = _back_to_front(instance, assembly) if plan.alpha == "blend" else None
+        blended = plan.alpha == "blend"
+        order = _back_to_front(instance, assembly) if blended else facing(instance, assembly.view)
         for index in range(max((len(group) for group in pages), default=1)):
             here = plan
             if index:
@@ -299,13 +301,16 @@ class Renderer:
             result.append([(group.key, self.context.gl.buffer(r.tobytes().ljust(whole, b"\0")), len(r)) for r in records])
         return result
 
-    def _attributes(self, scene: Scene) -> dict[str, str]:
-        return {
-            "glshade:version": __version__,
-            "glshade:renderer": f"{self.context.renderer}; {self.context.version}",
-            "glshade:scene": digest(scene),
-            "glshade:camera": scene.camera.model_dump_json(exclude_none=True),
-        }
+    def _attributes(self, prepared: Prepared) -> dict[str, str]:
+        """What a float picture says of its making."""
+        if prepared.attributes is None:
+            prepared.attributes = {
+                "glshade:version": __version__,
+                "glshade:renderer": f"{self.context.renderer}; {self.context.version}",
+                "glshade:scene": digest(prepared.scene),
+                "glshade:camera": prepared.scene.camera.model_dump_json(exclude_none=True),
+            }
+        return prepared.attributes
 
     def _program(self, source: Source) -> Program:
         if source not in self._programs:
@@ -336,7 +341,7 @@ class Renderer:
         return self._frames[key]
 
     def _buffer(self, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
-        """An array for a picture: one that no image holds any more, else a new one. Fresh memory costs a page fault every 4 KiB."""
+        """An array for a picture: one that no image holds any more, else a new one, which costs a page fault every 4 KiB."""
         for buffer in self._buffers:
             # Held by the list, by the loop and by getrefcount's own argument, and by nobody else.
             if sys.getrefcount(buffer) == 3 and buffer.shape == shape and buffer.dtype == dtype:

@@ -32,7 +32,7 @@ class Vertices:
         self._buffers: OrderedDict[tuple[Any, ...], tuple[Mesh, moderngl.Buffer]] = OrderedDict()
 
     def array(self, mesh: Mesh, program: Program, order: np.ndarray[Any, Any] | None = None) -> moderngl.VertexArray:
-        """The mesh, ready to be drawn by the program. order: triangle numbers, where they matter (blending)."""
+        """The mesh, ready to be drawn by the program. order: the triangles to draw, by number; None: all."""
         names = tuple(name for name in program.attributes if name in ATTRIBUTES)
         sizes = [ATTRIBUTES[name][1] for name in names]
         buffer = self._buffer((id(mesh), names), mesh, lambda: _interleaved(mesh, names))

@@ -4,8 +4,6 @@ A light's intensity I is the radiance that a white Lambertian facing it would sh
 surface reflects pi (f cos) I falloff. It may be negative.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -32,10 +30,12 @@ class Light(Document):
     # A light without a direction adds `ambient reflectance x intensity`, and has no illuminate().
     omnidirectional: ClassVar[bool] = False
 
-    @property
-    def falls_off(self) -> bool:
-        """Whether distance matters: such a light has position, falloff and r_min."""
-        return False
+    @classmethod
+    def fields(cls) -> dict[str, str]:
+        """The GLSL struct's fields in their order: name -> vec3 or float."""
+        anywhere = {"position": (0.0, 0.0, 0.0)} if "position" in cls.model_fields else {}
+        values = cls.model_validate(anywhere).uniforms(np.zeros(3))
+        return {name: "vec3" if np.size(value) == 3 else "float" for name, value in values.items()}
 
     def uniforms(self, eye: Array) -> dict[str, Any]:
         """The GLSL struct's fields in their order, float64; positions relative to `eye` (3,)."""
@@ -53,10 +53,6 @@ class Placed(Light):
     position: tuple[Finite, Finite, Finite] = Field(description="where it is [scene units]")
     falloff: Falloff = Field("1/r^2", description="how it weakens with distance: none, 1/r, or the physical 1/r^2")
     r_min: Annotated[float, Field(gt=0)] = Field(1e-3, description="within this distance it grows no brighter [scene units]")
-
-    @property
-    def falls_off(self) -> bool:
-        return self.falloff != "none"
 
     def uniforms(self, eye: Array) -> dict[str, Any]:
         return {**super().uniforms(eye), "r_min": self.r_min, "position": np.subtract(self.position, eye)}

@@ -1,7 +1,5 @@
 """ambient: light from everywhere alike."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Literal
 
 from glshade.lights import Light

@@ -1,7 +1,5 @@
 """directional: a light at infinity."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 import numpy as np

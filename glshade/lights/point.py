@@ -1,7 +1,5 @@
 """point: a light at one place, alike in all directions."""
 
-from __future__ import annotations
-
 from typing import Any, Literal
 
 import numpy as np

@@ -1,7 +1,5 @@
 """spot: a point light that shines into a cone."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 from typing import Annotated, Any, Literal

@@ -1,0 +1,63 @@
+"""Clusters: neighbouring triangles that look the same way, so that those behind a solid are never handed to the GPU."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glshade.assembly import Instance
+from glshade.camera import View
+from glshade.mesh import Mesh, face_normals
+
+Array = NDArray[np.float64]
+
+# Triangles a cluster: small enough to have one direction, large enough that asking costs less than drawing.
+SIZE = 128
+# Below this many triangles there is nothing to gain.
+WORTHWHILE = 4096
+# Rounding and sub-pixel snapping turn triangles that are seen edge-on; a cluster counts as hidden only beyond this sine.
+EDGE_ON = 0.02
+
+
+@lru_cache(maxsize=256)
+def _cones(mesh: Mesh) -> tuple[Array, Array, Array, Array]:
+    """(axis (K, 3), sine (K,), middle (K, 3), radius (K,)) of each full cluster, in the mesh's own space.
+
+    No normal leaves its axis by more than the sine's angle; a cluster that looks everywhere has a sine above 1.
+    """
+    count = len(mesh.triangles) // SIZE
+    normals = face_normals(mesh)[: count * SIZE].reshape(count, SIZE, 3)
+    axis = normals.sum(axis=1)
+    axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-30)
+    narrowest = np.einsum("ksi,ki->ks", normals, axis).min(axis=1)
+    sine = np.where(narrowest > 0, np.sqrt(np.maximum(1 - narrowest**2, 0.0)), 2.0)
+    corners = mesh.positions[mesh.triangles[: count * SIZE]].reshape(count, SIZE * 3, 3).astype(np.float64)
+    middle = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
+    radius = np.sqrt(np.square(corners - middle[:, None]).sum(axis=2).max(axis=1))
+    return axis, sine, middle, radius
+
+
+def facing(instance: Instance, view: View) -> NDArray[np.intp] | None:
+    """The triangles, without the clusters that show the viewer nothing but their backs; None: all of them.
+
+    Shirmun and Abi-Ezzi 1993's cone test, in the mesh's own space, where every affine transform keeps sides.
+    """
+    mesh = instance.mesh
+    if instance.back_faces or len(mesh.triangles) < WORTHWHILE:
+        return None
+    axis, sine, middle, radius = _cones(mesh)
+    linear, translation = instance.world_from_object[:3, :3], instance.world_from_object[:3, 3]
+    if view.perspective:
+        away = middle - np.linalg.solve(linear, view.eye - translation)
+        distance = np.linalg.norm(away, axis=1)
+        hidden = np.einsum("ki,ki->k", away, axis) >= (sine + EDGE_ON) * distance + radius
+    else:
+        forward = np.linalg.solve(linear, -view.axes[2])
+        hidden = axis @ (forward / np.linalg.norm(forward)) >= sine + EDGE_ON
+    if not hidden.any():
+        return None
+    shown = np.ones(len(mesh.triangles), dtype=bool)
+    shown[: len(hidden) * SIZE] = np.repeat(~hidden, SIZE)
+    return np.flatnonzero(shown)

@@ -1,0 +1,63 @@
+"""The float64 reference renderer, after the OpenGL specification and the models' papers. NumPy alone, no GL.
+
+prepare (inputs) -> rasterise, clip (raster) -> resolve -> interpolate, texture, shade -> compose
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glshade.image import Image
+from glshade.reference.inputs import Draw, Inputs, prepare
+from glshade.reference.raster import MARGIN, Fragments, rasterise, resolve
+from glshade.reference.shade import AT_CENTRE, Sampling, is_there, opacity, shade
+from glshade.scene import Rate, Scene
+
+__all__ = [
+    "MARGIN",
+    "Draw",
+    "Fragments",
+    "Inputs",
+    "Sampling",
+    "is_there",
+    "opacity",
+    "prepare",
+    "radiance",
+    "rasterise",
+    "render",
+    "resolve",
+    "shade",
+]
+
+
+def render(scene: Scene, *, shading: Rate | None = None) -> Image:
+    """The picture, float32 and linear, with alpha where the background has it; one sample a pixel, whatever the film says.
+
+    shading: overrules every object's. Errors: SceneError.
+    """
+    channels = len(scene.film.background)
+    return Image(radiance(scene, shading=shading)[..., :channels].astype(np.float32), "linear")
+
+
+def radiance(scene: Scene, *, shading: Rate | None = None, sampling: Sampling = AT_CENTRE) -> NDArray[Any]:
+    """(H, W, 4) float64, linear Rec. 709, premultiplied, row 0 at the top. Arguments and errors as for `render`.
+
+    sampling: how fragments are looked at; which of them are seen is decided in float64 and at the centre.
+    """
+    inputs = prepare(scene, shading)
+    nearest, layers = resolve(inputs, rasterise(inputs), lambda fragments: is_there(inputs, fragments))
+    width, height = inputs.size
+    picture: NDArray[Any] = np.broadcast_to(inputs.background, (width * height, 4)).astype(sampling.dtype)
+    picture[nearest.pixel] = shade(inputs, nearest, sampling)
+    over = shade(inputs, layers, sampling)
+    # Layer after layer, each over what is there: (C + (1 - alpha) D), Porter and Duff 1984.
+    start = np.flatnonzero(np.append(True, layers.pixel[1:] != layers.pixel[:-1])) if len(layers) else np.empty(0, int)
+    level = np.arange(len(layers)) - np.repeat(start, np.diff(np.append(start, len(layers))))
+    for number in range(int(level.max(initial=-1)) + 1):
+        which = np.flatnonzero(level == number)
+        pixel = layers.pixel[which]
+        picture[pixel] = over[which] + picture[pixel] * (1 - over[which, 3:])
+    return picture.reshape(height, width, 4)

@@ -1,0 +1,304 @@
+"""Shade: what a fragment shows to the viewer, in linear light.
+
+The models are evaluated through their float64 values in local coordinates (z along the normal). A fragment list is all it
+takes, wherever it comes from; sample positions, texture level and precision can be varied, to learn what a picture hangs on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glshade.reference.inputs import Draw, Inputs
+from glshade.reference.interpolate import blend, weights
+from glshade.reference.raster import Fragments
+from glshade.reference.texturing import Sampler
+
+Array = NDArray[Any]
+
+# Fragments shaded in one go: their arrays stay in the caches.
+PIECE = 1 << 15
+# As in the shaders: how far above the horizon of n an interpolated normal leaves the viewer.
+HORIZON = 1e-3
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How fragments are looked at. offset [pixels]: of the sample from the pixel's centre, right and down. level: added to the
+    textures' level of detail. dtype: of everything after interpolation, and of the vertex stage."""
+
+    offset: tuple[float, float] = (0.0, 0.0)
+    level: float = 0.0
+    dtype: Any = np.float64
+
+
+AT_CENTRE = Sampling()
+
+
+@dataclass(frozen=True, eq=False)
+class Surface:
+    """Points of a surface, in world space relative to the eye.
+
+    position, normal (N, 3), tangent (N, 4), uv (N, 2), colour (N, 4). The normal as interpolated, of any length. side (N,): -1
+    turns the normal over. footprint: change of uv from pixel to pixel, across and down; None in the vertex stage.
+    """
+
+    side: Array
+    position: Array
+    normal: Array
+    tangent: Array | None
+    uv: Array | None
+    colour: Array | None
+    footprint: tuple[Array, Array] | None = None
+    level: float = 0.0
+
+
+def shade(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) -> Array:
+    """(N, 4): linear Rec. 709, premultiplied, for fragments of any draws in any order. A cut-out's are taken to be there."""
+    result = np.zeros((len(fragments), 4), dtype=sampling.dtype)
+    for draw, which, some in _by_draw(inputs, fragments):
+        light = _RATES[draw.instance.rate](draw, some, inputs.size, sampling)
+        if draw.alpha_mode == "blend":
+            alpha = _alpha(draw, _surface(draw, some, inputs.size, sampling))[:, None]
+            result[which] = np.concatenate([light * alpha, alpha], axis=1)
+        else:
+            result[which, :3], result[which, 3] = light, 1.0
+    return result
+
+
+def opacity(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) -> Array:
+    """(N,): alpha as the textures and colours say, before a cut-out compares it."""
+    result = np.ones(len(fragments), dtype=sampling.dtype)
+    for draw, which, some in _by_draw(inputs, fragments):
+        if draw.alpha_mode != "opaque":
+            result[which] = _alpha(draw, _surface(draw, some, inputs.size, sampling))
+    return result
+
+
+def is_there(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) -> NDArray[np.bool_]:
+    """(N,): which fragments a cut-out keeps."""
+    cutoff = np.array([draw.alpha_cutoff if draw.alpha_mode == "mask" else -np.inf for draw in inputs.draws])
+    there: NDArray[np.bool_] = opacity(inputs, fragments, sampling) >= cutoff[fragments.draw].astype(sampling.dtype)
+    return there
+
+
+def _by_draw(inputs: Inputs, fragments: Fragments) -> Any:
+    """(draw, indices, fragments) in pieces of one draw each."""
+    order = np.argsort(fragments.draw, kind="stable")
+    bounds = np.searchsorted(fragments.draw[order], np.arange(len(inputs.draws) + 1))
+    for draw, first, end in zip(inputs.draws, bounds[:-1], bounds[1:], strict=True):
+        for start in range(first, end, PIECE):
+            which = order[start : min(start + PIECE, end)]
+            yield draw, which, fragments.take(which)
+
+
+def _per_pixel(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Array:
+    surface = _surface(draw, fragments, size, sampling)
+    sides = draw.instance.back_faces
+    side = np.where(fragments.front | (not sides), 1.0, -1.0).astype(sampling.dtype)
+    return _radiance(draw, replace(surface, side=side))
+
+
+def _per_vertex(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Array:
+    """Shaded at the corners, each for the side that the fragment shows, then interpolated."""
+    corners = draw.triangles[fragments.triangle]
+    x, y = _places(fragments, size, sampling)
+    weight = weights(draw, fragments.triangle, x, y, size, derivatives=False).values.astype(sampling.dtype)
+    result = np.zeros((len(fragments), 3), dtype=sampling.dtype)
+    back = ~fragments.front & draw.instance.back_faces
+    for side, which in ((1.0, np.flatnonzero(~back)), (-1.0, np.flatnonzero(back))):
+        if len(which):
+            vertices, place = np.unique(corners[which], return_inverse=True)
+            surface = _vertices(draw, vertices, sampling.dtype)
+            light = _radiance(draw, replace(surface, side=np.full(len(vertices), side, dtype=sampling.dtype)))
+            result[which] = blend(weight[which], light[place.reshape(-1, 3)])
+    return result
+
+
+def _per_face(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Array:
+    """Shaded once at the centroid; all three corners carry it."""
+    faces, place = np.unique(fragments.triangle, return_inverse=True)
+    surface = _vertices(draw, draw.triangles[faces, 2], sampling.dtype, centroids=True)
+    if draw.instance.back_faces:
+        facing = np.einsum("ij,ij->i", surface.normal, _viewer(draw, surface.position)) >= 0
+        surface = replace(surface, side=np.where(facing, 1.0, -1.0).astype(sampling.dtype))
+    result: Array = _radiance(draw, surface)[place]
+    return result
+
+
+_RATES = {"phong": _per_pixel, "gouraud": _per_vertex, "flat": _per_face}
+
+
+def _vertices(draw: Draw, which: NDArray[np.intp], dtype: Any, centroids: bool = False) -> Surface:
+    """The surface at vertices, or at the centroids that they carry."""
+    mesh = draw.instance.mesh
+    place = mesh.centroids if centroids and mesh.centroids is not None else mesh.positions
+    linear = draw.world_from_object[:3, :3].astype(dtype)
+    position = place[which].astype(dtype) @ linear.T + draw.world_from_object[:3, 3].astype(dtype)
+    if mesh.normals is None:
+        normal = np.zeros_like(position)
+    else:
+        normal = _unit(mesh.normals[which].astype(dtype) @ draw.normal_from_object.astype(dtype).T)
+    tangent = None
+    if draw.tangents and mesh.tangents is not None:
+        along = mesh.tangents[which].astype(dtype)
+        turned = _unit(along[:, :3] @ linear.T)
+        # A mirror turns right-handed frames into left-handed ones.
+        hand = -along[:, 3:] if draw.instance.mirrored else along[:, 3:]
+        tangent = np.concatenate([turned, hand], axis=1)
+    uv = None if mesh.uvs is None else mesh.uvs[which].astype(dtype)
+    colour = mesh.colours[which].astype(dtype) if draw.instance.vertex_colours and mesh.colours is not None else None
+    return Surface(np.ones(len(position), dtype=dtype), position, normal, tangent, uv, colour)
+
+
+def _places(fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> tuple[Array, Array]:
+    y, x = np.divmod(fragments.pixel.astype(np.intp), size[0])
+    return x + 0.5 + sampling.offset[0], y + 0.5 + sampling.offset[1]
+
+
+def _surface(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Surface:
+    """The surface at fragments, interpolated."""
+    triangle = fragments.triangle
+    x, y = _places(fragments, size, sampling)
+    textured = bool(draw.samplers) or draw.normal_map is not None
+    weight = weights(draw, triangle, x, y, size, derivatives=textured)
+    vertices, place = np.unique(draw.triangles[triangle], return_inverse=True)
+    corner = _vertices(draw, vertices, sampling.dtype)
+    place = place.reshape(-1, 3)
+
+    def at(values: Array | None, by: Array = weight.values) -> Any:
+        return None if values is None else blend(by.astype(sampling.dtype), values[place])
+
+    footprint = None
+    if textured and corner.uv is not None:
+        footprint = at(corner.uv, weight.dx), at(corner.uv, weight.dy)
+    return Surface(
+        side=np.ones(len(triangle), dtype=sampling.dtype),
+        position=at(corner.position),
+        normal=at(corner.normal),
+        tangent=at(corner.tangent),
+        uv=at(corner.uv),
+        colour=at(corner.colour),
+        footprint=footprint,
+        level=sampling.level,
+    )
+
+
+def _sampled(sampler: Sampler, surface: Surface) -> Array:
+    if surface.uv is None:
+        raise ValueError("a texture needs texture coordinates")
+    if surface.footprint is None:
+        return sampler.sample(surface.uv)
+    return sampler.sample(surface.uv, sampler.level(*surface.footprint) + surface.level)
+
+
+def _alpha(draw: Draw, surface: Surface) -> Array:
+    value = np.full(len(surface.position), draw.alpha, dtype=surface.position.dtype)
+    if draw.alpha_sampler is not None:
+        value = value * _sampled(draw.alpha_sampler, surface)[:, 3]
+    if surface.colour is not None:
+        value = value * surface.colour[:, 3]
+    return value
+
+
+def _material(draw: Draw, surface: Surface) -> SimpleNamespace:
+    """The model's parameters at the points: colours (N, 3) or (3,), scalars (N,) or ()."""
+    found: dict[str, Array] = {}
+    for name, declared in draw.model.parameters().items():
+        value = draw.parameters[name].astype(surface.position.dtype)
+        colour = draw.model.is_colour(name)
+        if name in draw.samplers:
+            texel = _sampled(draw.samplers[name], surface)
+            value = value * (texel[:, :3] if colour else texel[:, 0])
+        # A parameter that equals the surface's own colour equals it with its vertex colours.
+        tinted = declared.base or _stands_for_base(draw, name)
+        if tinted and surface.colour is not None:
+            value = value * surface.colour[:, :3]
+        found[name] = value
+    return SimpleNamespace(**found)
+
+
+def _stands_for_base(draw: Draw, name: str) -> bool:
+    declared = draw.model.parameters()
+    same_as = declared[name].same_as
+    return same_as is not None and declared[same_as].base and getattr(draw.instance.material, name) is None
+
+
+def _frame(draw: Draw, surface: Surface) -> tuple[Array, Array, Array]:
+    """(t, b, n), each (N, 3): unit and perpendicular, n on the side that is seen."""
+    n = _unit(surface.normal)
+    side = surface.side[:, None]
+    if surface.tangent is None:
+        return (*_any_tangents(side * n), side * n)
+    t = _unit(_without(surface.tangent[:, :3], n))
+    b = np.cross(n, t) * surface.tangent[:, 3:]
+    n = side * n
+    if draw.normal_map is not None:
+        x, y, z = (2 * _sampled(draw.normal_map, surface)[:, :3] - 1).T[..., None]
+        n = _unit(draw.normal_scale * (x * t + y * b) + z * n)
+        t = _unit(_without(t, n))
+        b = _unit(_without(_without(b, n), t))
+    return t, b, n
+
+
+def _viewer(draw: Draw, position: Array) -> Array:
+    """v (N, 3)."""
+    if draw.viewer is None:
+        return _unit(-position)
+    return np.broadcast_to(draw.viewer.astype(position.dtype), position.shape)
+
+
+def _radiance(draw: Draw, surface: Surface) -> Array:
+    """(N, 3): the sum over the lights of what the points show to the viewer."""
+    dtype = surface.position.dtype
+    m = _material(draw, surface)
+    total = np.zeros((len(surface.position), 3), dtype=dtype)
+    if draw.ambient.any():
+        total += draw.ambient.astype(dtype) * draw.model.ambient_reflectance(m)
+    if not draw.lamps:
+        return total
+    t, b, n = _frame(draw, surface)
+
+    def local(direction: Array) -> Array:
+        return np.stack([np.einsum("ij,ij->i", axis, direction) for axis in (t, b, n)], axis=1)
+
+    v = _viewer(draw, surface.position)
+    # A pixel that is seen faces the viewer, whatever an average of its neighbours' normals says: lifted to the horizon.
+    v = _unit(v + n * np.maximum(HORIZON - np.einsum("ij,ij->i", n, v), 0)[:, None])
+    v_local = local(v)
+    for lamp in draw.lamps:
+        light = lamp.fields(dtype)
+        l, e = lamp.kind.illuminate(light, surface.position)
+        if lamp.falloff != "none":
+            r = np.maximum(np.linalg.norm(light.position - surface.position, axis=1), light.r_min)
+            e = e / (r if lamp.falloff == "1/r" else r * r)[:, None]
+        total += e * draw.model.brdf_cos(m, local(l), v_local)
+    return total
+
+
+def _unit(x: Array) -> Array:
+    """x (..., 3) made unit; the zero vector stays."""
+    largest = np.abs(x).max(axis=-1, keepdims=True)
+    scaled = x / np.where(largest > 0, largest, 1)
+    length = np.linalg.norm(scaled, axis=-1, keepdims=True)
+    result: Array = scaled / np.where(length > 0, length, 1)
+    return result
+
+
+def _without(x: Array, n: Array) -> Array:
+    """x (N, 3) less its part along n."""
+    result: Array = x - n * np.einsum("ij,ij->i", n, x)[:, None]
+    return result
+
+
+def _any_tangents(n: Array) -> tuple[Array, Array]:
+    """t, b (N, 3) perpendicular to the unit n (N, 3): Duff et al. 2017, listing 3. For models that are alike all round."""
+    x, y, z = n.T
+    sign = np.copysign(np.ones_like(z), z)
+    a = -1 / (sign + z)
+    c = x * y * a
+    return np.stack([1 + sign * x * x * a, sign * c, -sign * x], axis=1), np.stack([c, sign + y * y * a, -y], axis=1)

@@ -1,0 +1,195 @@
+"""docs/scene-file.md from the models of the scene file, and docs/images from scenes/. Called by script/make-docs."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from glshade.brdfs import BRDFS, Brdf
+from glshade.camera import CAMERAS, Camera
+from glshade.document import Document
+from glshade.lights import LIGHTS, Light
+from glshade.scene import Film, Object, Scene, Transform
+from glshade.shape import SHAPES
+from glshade.texture import NormalMap, Texture
+
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs" / "scene-file.md"
+# The README's pictures: (scene, width [pixels]).
+PICTURES = (("gallery", 960), ("shading-rates", 460), ("ashikhmin-shirley-grid", 460), ("half-angle-grazing", 460), ("detail", 460))
+
+INTRODUCTION = """\
+# The scene file
+
+<!-- Made by script/make-docs from the models; change those, not this. -->
+
+TOML, or JSON of the same shape. `glshade schema` prints the same as a JSON schema. Files are named relative to the scene file's
+folder. Unknown keys are errors, and so are numbers that are not finite; every fault of a file is reported at once.
+
+A colour is three numbers, linear Rec. 709, or one number that stands for three equal ones. "required" in the column of defaults
+means that there is none; "-" means that the key may be left out and then does what its meaning says.
+
+Lists of tables may be written either way: `[[objects]]` and its keys below, or `objects = [ { ... }, { ... } ]`, which in TOML has
+to stand above the first `[table]`.
+"""
+
+# What some keys hold, where the schema says it at length.
+NAMED = {
+    ("Scene", "film"): "[film](#film)",
+    ("Scene", "camera"): "[camera](#camera)",
+    ("Scene", "materials"): "table of [materials](#materials)",
+    ("Scene", "objects"): "list of [objects](#objects)",
+    ("Scene", "lights"): "list of [lights](#lights)",
+    ("Object", "shape"): "[shape](#shapes), or its type alone",
+    ("Object", "transform"): "[transform](#transform)",
+    ("Object", "material"): "name, or [material](#materials)",
+    ("Film", "background"): "3 or 4 numbers",
+}
+SAID = {
+    ("Scene", "film"): "what the picture is recorded on",
+    ("Scene", "camera"): "who looks; left out: a perspective view of the whole scene",
+    ("Object", "transform"): "where it is",
+}
+
+
+def kind(schema: Mapping[str, Any]) -> str:
+    """What a key takes, in the words of an author of scenes."""
+    if "const" in schema:
+        return f'`"{schema["const"]}"`'
+    if "enum" in schema:
+        return ", ".join(f"`{json.dumps(value)}`" for value in schema["enum"])
+    if "$ref" in schema:
+        name = schema["$ref"].rsplit("/", 1)[-1]
+        return {"Texture": "[texture](#textures)", "NormalMap": "[normal map](#normal-maps)"}.get(name, name)
+    options = [option for option in schema.get("anyOf", schema.get("oneOf", ())) if option.get("type") != "null"]
+    if options:
+        words = [kind(option) for option in options]
+        if words[:2] == ["number", "3 numbers"]:
+            words[:2] = ["3 numbers or 1"]
+        return ", or ".join(words)
+    form = schema.get("type")
+    if form == "array":
+        items = schema.get("prefixItems", [schema.get("items", {})])
+        count = schema.get("maxItems")
+        if items[0].get("type") == "array":
+            return f"{count} rows of {kind(items[0])}"
+        if "enum" in items[0]:
+            return f"{count} of these"
+        words = kind(items[0])
+        one, _, bounds = words.partition(" ")
+        return f"{count} {one}s {bounds}".strip() if count else f"list of {words}s"
+    if form == "string":
+        return "file" if schema.get("format") == "path" else "string"
+    word = {"integer": "integer", "number": "number", "boolean": "`true`, `false`"}[str(form)]
+    return word + _bounds(schema)
+
+
+def _bounds(schema: Mapping[str, Any]) -> str:
+    low, high = schema.get("minimum"), schema.get("maximum")
+    above, below = schema.get("exclusiveMinimum", schema.get("gt")), schema.get("exclusiveMaximum", schema.get("lt"))
+    parts = []
+    parts += [f"from {low:g}"] if low is not None else [f"above {above:g}"] if above is not None else []
+    parts += [f"to {high:g}"] if high is not None else [f"below {below:g}"] if below is not None else []
+    return (" " + " ".join(parts)) if parts else ""
+
+
+def default(schema: Mapping[str, Any], key: str) -> str:
+    """The default as a scene file would write it."""
+    if "default" not in schema:
+        return "required"
+    value = schema["default"]
+    if value is None or value in ("", {}) or (isinstance(value, dict) and value):
+        return "-"
+    if key in {"type", "brdf"}:
+        return f"`{json.dumps(value)}`" if value == "perspective" else "required"
+    if isinstance(value, list) and len(value) == 3 and len(set(value)) == 1 and "prefixItems" not in schema:
+        value = value[0]
+
+    def plain(item: Any) -> Any:
+        return int(item) if isinstance(item, float) and item == int(item) else item
+
+    return f"`{json.dumps([plain(item) for item in value] if isinstance(value, list) else plain(value))}`"
+
+
+def table(model: type[Document], without: type[Document] | None = None) -> str:
+    """The keys of a model, but for those that another has already."""
+    known = set(without.model_fields) if without else set()
+    rows = []
+    for key, schema in model.model_json_schema()["properties"].items():
+        if key in known and key not in {"type", "brdf"}:
+            continue
+        place = (model.__name__, key)
+        meaning = SAID.get(place, schema.get("description", ""))
+        takes = NAMED.get(place) or kind(schema)
+        declared = schema.get("glshade")
+        if declared:
+            takes += _limits(declared)
+            meaning = meaning.removesuffix(" [1]")
+        if key in {"type", "brdf"}:
+            if "const" not in schema:
+                continue
+            meaning = meaning or "chooses this one"
+        rows.append(f"| `{key}` | {takes} | {default(schema, key)} | {meaning} |")
+    return "| key | takes | default | meaning |\n|---|---|---|---|\n" + "\n".join(rows) + "\n" if rows else ""
+
+
+def _limits(declared: Mapping[str, Any]) -> str:
+    if declared["high"] is not None:
+        return f"; from {declared['low']:g} to {declared['high']:g}"
+    return f"; at least {declared['low']:g}"
+
+
+def about(model: type[Document]) -> str:
+    """A model's own words, one paragraph."""
+    return " ".join((model.__doc__ or "").split()) + "\n"
+
+
+def section(level: int, title: str, model: type[Document], without: type[Document] | None = None) -> str:
+    return f"\n{'#' * level} {title}\n\n{about(model)}\n{table(model, without)}"
+
+
+def scene_file() -> str:
+    """The text of docs/scene-file.md."""
+    text = INTRODUCTION
+    text += section(2, "The whole", Scene) + section(2, "Film", Film)
+    text += section(2, "Camera", Camera)
+    for name, model in CAMERAS.items():
+        text += section(3, f"`{name}`", model, Camera)
+    text += section(2, "Objects", Object) + section(3, "Transform", Transform)
+    text += "\n## Shapes\n\nPrimitives of unit size about the origin. `shape = \"cube\"` stands for `shape = { type = \"cube\" }`.\n"
+    for name, model in SHAPES.items():
+        text += section(3, f"`{name}`", model)
+    text += section(2, "Materials", Brdf)
+    for name in BRDFS:
+        text += section(3, f"`{name}`", BRDFS[name], Brdf)
+        text += f"\nSource: {BRDFS[name].source}.\n"
+    text += section(3, "Textures", Texture) + section(3, "Normal maps", NormalMap)
+    text += section(2, "Lights", Light)
+    for name in LIGHTS:
+        text += section(3, f"`{name}`", LIGHTS[name], Light)
+    return text.replace("\n\n\n", "\n\n")
+
+
+def pictures() -> None:
+    from glshade import Renderer, load
+
+    folder = ROOT / "docs" / "images"
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, width in PICTURES:
+        scene = load(ROOT / "scenes" / f"{name}.toml")
+        full_width, full_height = scene.film.size
+        size = (width, round(full_height * width / full_width))
+        with Renderer() as renderer:
+            scene = scene.model_copy(update={"film": scene.film.model_copy(update={"size": size})})
+            renderer.render(scene).save(folder / f"{name}.png")
+
+
+if __name__ == "__main__":
+    if sys.argv[1:] == ["--check"]:
+        current = PAGE.exists() and PAGE.read_text(encoding="utf-8") == scene_file()
+        sys.exit(0 if current else "docs/scene-file.md is out of date: run script/make-docs")
+    PAGE.write_text(scene_file(), encoding="utf-8")
+    pictures()

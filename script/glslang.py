@@ -1,0 +1,104 @@
+"""Has glslangValidator, a second compiler, read every program that the generator can make of one feature at a time.
+
+python script/glslang.py: exit code 1 where it finds fault, 0 with a word of warning where it is not installed.
+"""
+
+from __future__ import annotations
+
+import itertools
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+from glshade.assembly import assemble
+from glshade.brdfs import BRDFS
+from glshade.gl.evaluate import generated
+from glshade.lights import LIGHTS
+from glshade.plan import LightGroup, ProgramPlan, plan
+from glshade.scene_file import load
+from glshade.source import Source, expand, generate
+
+ROOT = Path(__file__).parent.parent
+
+
+def groups(count: int) -> tuple[LightGroup, ...]:
+    """`count` lights of every kind, white and coloured; a page of each where it is 0."""
+    found = []
+    for name, cls in LIGHTS.items():
+        falloffs = ("none", "1/r", "1/r^2") if "falloff" in cls.model_fields else ("none",)
+        for falloff, white in itertools.product(() if cls.omnidirectional else falloffs, (False, True) if count else (False,)):
+            found.append(LightGroup(name, falloff, white, count))
+    return tuple(found)
+
+
+def plans() -> Iterator[ProgramPlan]:
+    """Every model at every rate with every light, and every other feature with one of them."""
+    rates, viewers = ("flat", "gouraud", "phong"), ("perspective", "orthographic")
+    for (name, model), use in itertools.product(BRDFS.items(), ("uniform", "texture")):
+        parameters = tuple((p, use) for p in model.parameters())
+        unused = tuple((p, "unused") for p in model.parameters())
+        textured = parameters[0][0] if use == "texture" else None
+        base = ProgramPlan(
+            "phong", name, parameters, groups(1), True, False, "perspective", False, "opaque", None, False, False, "srgb"
+        )
+        yield base
+        for rate, viewer, both in itertools.product(rates, viewers, (False, True)):
+            one = replace(base, rate=rate, viewer=viewer, both_sides=both, encoding="linear")
+            yield from (replace(one, lights=groups(count)) for count in (0, 1, 3))
+            yield replace(one, ambient=False, lights=groups(1)[:1])
+            yield replace(one, normal_map=True, vertex_colours=True, alpha="mask", alpha_from=textured)
+            yield replace(one, vertex_colours=True, alpha="blend", alpha_from=textured)
+            if not both:
+                yield replace(one, lights=(), ambient_white=True)
+                yield replace(one, lights=(), ambient=False, parameters=unused)
+    for path in sorted((ROOT / "scenes").glob("*.toml")):
+        for encoding in ("linear", "srgb"):
+            yield from plan(assemble(load(path)), encoding).programs
+
+
+def sources() -> Iterator[Source]:
+    """The programs of plans, and the few that no plan describes."""
+    yield from (generate(one) for one in dict.fromkeys(plans()))
+    for encoding in ("linear", "srgb"):
+        output = {"output": f'#include "output/{encoding}.glsl"\n'}
+        yield Source(expand("pass/picture.vert", {}), expand("pass/picture.frag", output))
+    for model in BRDFS.values():
+        text = generated(model())
+        yield Source(expand("pass/evaluate.vert", text), expand("pass/evaluate.frag", text))
+
+
+def main() -> int:
+    """Writes every distinct stage to a file and has them read in one go."""
+    compiler = shutil.which("glslangValidator")
+    if compiler is None:
+        print("glslangValidator is not installed: no second compiler has read the shaders", file=sys.stderr)
+        return 0
+    stages = {}
+    for source in sources():
+        stages[source.vertex.text] = (source.vertex, "vert")
+        if source.fragment:
+            stages[source.fragment.text] = (source.fragment, "frag")
+    with tempfile.TemporaryDirectory() as folder:
+        files = {}
+        for index, (text, (stage, suffix)) in enumerate(stages.items()):
+            path = Path(folder) / f"{index}.{suffix}"
+            path.write_text(text, encoding="utf-8")
+            files[str(path)] = stage
+        done = subprocess.run([compiler, "-t", *files], capture_output=True, text=True, check=False)
+    faults = [line for line in done.stdout.splitlines() if line.startswith(("ERROR", "WARNING"))]
+    current = None
+    for line in done.stdout.splitlines():
+        current = files.get(line.strip(), current)
+        if line.startswith(("ERROR: 0:", "WARNING: 0:")) and current is not None:
+            number, _, message = line.split(":", 2)[2].partition(":")
+            print(f"{current.place(int(number))}:{message}")
+    print(f"glslangValidator: {len(stages)} stages read, {len(faults)} complaints")
+    return 1 if done.returncode or faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,68 @@
+"""Law: the GLSL function, in the vertex and in the fragment stage, has the value of the float64 one."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glshade import BRDFS, Renderer, evaluate
+from strategies import directions, materials
+
+# float32 has 6e-8; the terms of a model add up to some ten roundings of a value near 1.
+TOLERANCE = 2e-6
+# Where that is not enough, the reason.
+EXCEPTIONS = {
+    # exp(-x) is wrong by x roundings of x's own factors. A peak of 1e3 (narrow, or divided by a grazing l.h) still shows at
+    # x = 10 and more. 5.0e-6 is the worst of 1e7 evaluations.
+    "ashikhmin_shirley": 8e-6,
+}
+
+
+@pytest.mark.parametrize("on", ["vertex", "fragment"])
+@pytest.mark.parametrize("name", BRDFS)
+@settings(max_examples=15)
+@given(data=st.data(), seed=st.integers(0, 2**32 - 1))
+def test_gpu_equals_reference(name: str, on: Any, renderer: Renderer, data: Any, seed: int) -> None:
+    material = data.draw(materials(name))
+    l = directions(512, seed)
+    # Half of the viewers look into the lobe, where the models have their slopes.
+    near_mirror = l[:256] * np.float32([-1, -1, 1]) + np.random.default_rng(seed).normal(scale=0.05, size=(256, 3))
+    near_mirror[:, 2] = np.abs(near_mirror[:, 2])
+    near_mirror /= np.linalg.norm(near_mirror, axis=1, keepdims=True)
+    v = np.concatenate([near_mirror, directions(256, seed + 1)]).astype(np.float32)
+    exact = evaluate(material, l, v)
+    error = np.abs(evaluate(material, l, v, on=on, context=renderer.context) - exact) / np.maximum(1, np.abs(exact))
+    worst = np.unravel_index(np.argmax(error), error.shape)
+    assert error[worst] <= EXCEPTIONS.get(name, TOLERANCE), f"l {l[worst[0]]}, v {v[worst[0]]}: {exact[worst]}"
+
+
+def test_shapes_broadcast(renderer: Renderer) -> None:
+    l, v = directions(3, 1)[:, None], directions(5, 2)
+    for on in ("reference", "vertex", "fragment"):
+        value = evaluate(BRDFS["phong"](), l, v, on=on, context=renderer.context)  # type: ignore[arg-type]
+        assert value.shape == (3, 5, 3)
+        one = evaluate(BRDFS["phong"](), l[1, 0], v[4], on=on, context=renderer.context)  # type: ignore[arg-type]
+        assert np.array_equal(value[1, 4], one)
+    assert evaluate(BRDFS["phong"](), np.zeros((0, 3)), np.zeros((0, 3)), on="fragment", context=renderer.context).shape == (0, 3)
+
+
+def test_more_directions_than_a_row_of_pixels(renderer: Renderer) -> None:
+    l, v = directions(5000, 1), directions(5000, 2)
+    for on in ("vertex", "fragment"):
+        value = evaluate(BRDFS["lambert"](), l, v, on=on, context=renderer.context)  # type: ignore[arg-type]
+        assert value == pytest.approx(evaluate(BRDFS["lambert"](), l, v), abs=1e-7)
+
+
+def test_what_it_refuses(tmp_path: Any) -> None:
+    (tmp_path / "a.png").write_bytes(b"")
+    textured = BRDFS["lambert"](kd={"texture": tmp_path / "a.png"})
+    with pytest.raises(ValueError, match="kd is a texture"):
+        evaluate(textured, [0, 0, 1], [0, 0, 1])
+    with pytest.raises(ValueError, match="shape"):
+        evaluate(BRDFS["lambert"](), [0, 1], [0, 1])
+    with pytest.raises(ValueError, match='"vertex" or "fragment"'):
+        evaluate(BRDFS["lambert"](), [0, 0, 1], [0, 0, 1], on="pixel")  # type: ignore[arg-type]
