@@ -19,7 +19,13 @@ from glshade.texture import NormalMap, Texture
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "scene-file.md"
 # The README's pictures: (scene, width [pixels]).
-PICTURES = (("gallery", 960), ("shading-rates", 460), ("ashikhmin-shirley-grid", 460), ("half-angle-grazing", 460), ("detail", 460))
+PICTURES = (
+    ("gallery", 960),
+    ("shading-rates", 460),
+    ("ashikhmin-shirley-grid", 460),
+    ("half-angle-grazing", 460),
+    ("detail", 460),
+)
 
 INTRODUCTION = """\
 # The scene file
@@ -159,7 +165,9 @@ def scene_file() -> str:
     for name, model in CAMERAS.items():
         text += section(3, f"`{name}`", model, Camera)
     text += section(2, "Objects", Object) + section(3, "Transform", Transform)
-    text += "\n## Shapes\n\nPrimitives of unit size about the origin. `shape = \"cube\"` stands for `shape = { type = \"cube\" }`.\n"
+    text += (
+        '\n## Shapes\n\nPrimitives of unit size about the origin. `shape = "cube"` stands for `shape = { type = "cube" }`.\n'
+    )
     for name, model in SHAPES.items():
         text += section(3, f"`{name}`", model)
     text += section(2, "Materials", Brdf)

@@ -54,6 +54,10 @@ class Context:
     def __init__(self, gl: moderngl.Context, backend: str, procedure: Callable[[str], int | None]) -> None:
         self.gl, self.backend = gl, backend
         self._procedure = procedure
+        # What Python forgets is kept aside until gc() is called with this context current: the same number may be a
+        # living object of another context.
+        gl.gc_mode = "context_gc"
+        self._released = False
         clip_control = self.procedure("glClipControl", None, ctypes.c_uint, ctypes.c_uint)
         self.zero_to_one = clip_control is not None and (gl.version_code >= 450 or "GL_ARB_clip_control" in gl.extensions)
         if self.zero_to_one and clip_control is not None:
@@ -81,8 +85,10 @@ class Context:
         return ctypes.CFUNCTYPE(result, *arguments)(address) if address else None
 
     def release(self) -> None:
-        """Gives everything back to the driver."""
-        self.gl.release()
+        """Gives everything back to the driver. Twice is once."""
+        if not self._released:
+            self._released = True
+            self.gl.release()
 
 
 def open_context(backend: Backend = "auto", device: int | None = None) -> Context:

@@ -41,7 +41,8 @@ def evaluate(brdf: Brdf, l: ArrayLike, v: ArrayLike, on: On = "reference", conte
     opened = context or open_context()
     try:
         stage = _in_vertex_stage if on == "vertex" else _in_fragment_stage
-        flat = stage(opened, brdf, values, l.reshape(-1, 3), v.reshape(-1, 3))
+        with opened.gl:
+            flat = stage(opened, brdf, values, l.reshape(-1, 3), v.reshape(-1, 3))
         return flat.reshape(l.shape)
     finally:
         if context is None:

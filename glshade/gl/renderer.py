@@ -108,6 +108,12 @@ class Renderer:
         overrules every object's. tile: the largest side drawn in one piece [pixels]; left out: what the driver can.
         Errors: SceneError, ShaderError.
         """
+        # Another renderer, or another program in this process, may have made its own context current.
+        with self.context.gl:
+            self.context.gl.gc()
+            return self._render(scene, dtype, shading, tile)
+
+    def _render(self, scene: Scene, dtype: DType, shading: Rate | None, tile: int | None) -> Image:
         film = scene.film
         passes = _sample_passes(film.samples, self.context.gl.max_samples)
         opaque = len(film.background) == 3

@@ -50,10 +50,9 @@ def _cut_by(polygons: Array, counts: NDArray[np.intp], plane: Array) -> tuple[Ar
     here, there = polygons @ plane, after @ plane
     inside = here >= 0
     crossing = used & (inside != (there >= 0))
-    gap = np.where(crossing, here - there, 1.0)
     # From the inner end always, so that an edge is cut at the same place for both its triangles.
     inner, outer = np.where(inside[..., None], polygons, after), np.where(inside[..., None], after, polygons)
-    t = np.where(inside, here, -there) / np.where(crossing, np.abs(gap), 1.0)
+    t = np.where(inside, here, there) / np.where(crossing, np.abs(here - there), 1.0)
     cuts = inner + t[..., None] * (outer - inner)
     # Each corner leaves itself, a cut, both or nothing.
     candidates = np.stack([polygons, cuts], axis=2).reshape(number, 2 * size, 4)

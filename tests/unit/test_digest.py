@@ -1,0 +1,90 @@
+"""The digest of a scene: its content, and nothing but its content."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from glshade import Image, Object, Scene, load
+from glshade.digest import digest
+
+SPHERE = {"shape": "sphere"}
+TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"
+
+
+def of(**keys: Any) -> str:
+    return digest(Scene.model_validate({"objects": [SPHERE], **keys}))
+
+
+def test_it_is_64_letters_and_stays() -> None:
+    assert len(of()) == 64
+    assert of() == of()
+    assert of(objects=[{"shape": {"type": "sphere", "segments": 96}}]) == of(), "what is left out is its default"
+
+
+def test_every_word_counts() -> None:
+    scenes = [
+        of(),
+        of(film={"exposure": 1e-9}),
+        of(film={"size": [512, 511]}),
+        of(camera={"fov": 41}),
+        of(camera={"type": "orthographic"}),
+        of(lights=[]),
+        of(lights=[{"type": "ambient"}]),
+        of(lights=[{"type": "ambient", "intensity": 2}]),
+        of(lights=[{"type": "ambient", "intensity": 2}] * 2),
+        of(objects=[{"shape": "cube"}]),
+        of(objects=[{"shape": {"type": "sphere", "segments": 95}}]),
+        of(objects=[{**SPHERE, "material": {"brdf": "phong"}}]),
+        of(objects=[{**SPHERE, "material": {"brdf": "blinn_phong"}}]),
+        of(objects=[{**SPHERE, "material": {"brdf": "phong", "kd": 0.7}}]),
+        of(objects=[{**SPHERE, "shading": "flat"}]),
+        of(objects=[{**SPHERE, "transform": {"translate": [0, 0, 1e-12]}}]),
+    ]
+    assert len(set(scenes)) == len(scenes)
+
+
+def make(folder: Path, grey: float = 0.5, height: str = "1") -> Scene:
+    folder.mkdir()
+    (folder / "tri.obj").write_text(TRIANGLE.replace("v 0 1 0", f"v 0 {height} 0"))
+    Image(np.full((2, 2, 3), grey, dtype=np.float32)).save(folder / "t.png")
+    (folder / "s.toml").write_text('[[objects]]\nmesh = "tri.obj"\nmaterial = {brdf = "lambert", kd = {texture = "t.png"}}\n')
+    return load(folder / "s.toml")
+
+
+def test_where_files_lie_does_not_count(tmp_path: Path) -> None:
+    first = digest(make(tmp_path / "a"))
+    shutil.copytree(tmp_path / "a", tmp_path / "b")
+    assert digest(load(tmp_path / "b" / "s.toml")) == first
+
+
+def test_what_files_hold_counts(tmp_path: Path) -> None:
+    first = digest(make(tmp_path / "a"))
+    assert digest(make(tmp_path / "b", grey=0.6)) != first
+    assert digest(make(tmp_path / "c", height="2")) != first
+    same = make(tmp_path / "d")
+    assert digest(same) == first
+    (tmp_path / "d" / "tri.obj").write_text(TRIANGLE.replace("v 1 0 0", "v 3 0 0"))
+    assert digest(same) != first, "the file has changed under the scene"
+
+
+def test_meshes_made_in_python() -> None:
+    def of_mesh(scale: float) -> str:
+        return digest(Scene(objects=[Object(mesh=(np.eye(3) * scale, [[0, 1, 2]]))]))
+
+    assert of_mesh(1) == of_mesh(1)
+    assert of_mesh(1) != of_mesh(2)
+
+
+@pytest.mark.xfail(strict=True, reason="names of a mesh's material and textures beside it are not part of the digest")
+def test_the_material_library_of_a_mesh_counts(tmp_path: Path) -> None:
+    (tmp_path / "tri.obj").write_text("mtllib m.mtl\nusemtl m\n" + TRIANGLE)
+    (tmp_path / "s.toml").write_text('[[objects]]\nmesh = "tri.obj"\n')
+    (tmp_path / "m.mtl").write_text("newmtl m\nKd 1 0 0\n")
+    first = digest(load(tmp_path / "s.toml"))
+    (tmp_path / "m.mtl").write_text("newmtl m\nKd 0 1 0\n")
+    assert digest(load(tmp_path / "s.toml")) != first
