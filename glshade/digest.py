@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from glshade import mesh_file
 from glshade.document import Document
 from glshade.mesh import Mesh
 from glshade.scene import Scene
@@ -16,6 +17,10 @@ def digest(scene: Scene) -> str:
     """SHA-256 of everything that the scene says, files by their content."""
 
     def content(value: Any) -> Any:
+        if isinstance(value, Path) and value.suffix.lower() in mesh_file.SUFFIXES:
+            # With the materials, textures and buffers that lie beside it.
+            parts = mesh_file.load(value).parts
+            return [(part.mesh.digest, part.transform.tolist(), files(part.material)) for part in parts]
         if isinstance(value, Path):
             return hashlib.sha256(value.read_bytes()).hexdigest()
         if isinstance(value, Mesh):
@@ -27,6 +32,12 @@ def digest(scene: Scene) -> str:
         if isinstance(value, tuple | list):
             return [content(item) for item in value]
         return value
+
+    def files(material: Any) -> Any:
+        """A material of a mesh file, whose textures are named by strings."""
+        if isinstance(material, dict):
+            return {key: content(Path(item)) if key == "texture" else files(item) for key, item in material.items()}
+        return material
 
     text = json.dumps(content(scene), sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()

@@ -38,8 +38,8 @@ folder. Unknown keys are errors, and so are numbers that are not finite; every f
 A colour is three numbers, linear Rec. 709, or one number that stands for three equal ones. "required" in the column of defaults
 means that there is none; "-" means that the key may be left out and then does what its meaning says.
 
-Lists of tables may be written either way: `[[objects]]` and its keys below, or `objects = [ { ... }, { ... } ]`, which in TOML has
-to stand above the first `[table]`.
+Lists of tables may be written either way: `[[objects]]` and its keys below, or `objects = [ { ... }, { ... } ]`, which in
+TOML has to stand above the first `[table]`.
 """
 
 # What some keys hold, where the schema says it at length.
@@ -182,7 +182,7 @@ def scene_file() -> str:
 
 
 def pictures() -> None:
-    from glshade import Renderer, load
+    from glshade import Image, Renderer, load
 
     folder = ROOT / "docs" / "images"
     folder.mkdir(parents=True, exist_ok=True)
@@ -192,7 +192,9 @@ def pictures() -> None:
         size = (width, round(full_height * width / full_width))
         with Renderer() as renderer:
             scene = scene.model_copy(update={"film": scene.film.model_copy(update={"size": size})})
-            renderer.render(scene).save(folder / f"{name}.png")
+            image = renderer.render(scene)
+        # Without attributes: the file changes when the picture does, and not with the driver's name.
+        Image(image.pixels, image.encoding).save(folder / f"{name}.png")
 
 
 if __name__ == "__main__":

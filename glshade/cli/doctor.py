@@ -8,7 +8,7 @@ import click
 
 
 @click.command()
-@click.option("--backend", type=click.Choice(["auto", "egl", "standalone"]), default="auto", show_default=True)
+@click.option("--backend", type=click.Choice(["auto", "egl", "osmesa", "standalone"]), default="auto", show_default=True)
 @click.option("--device", type=int, help="EGL device, as `glshade devices` counts them.")
 def command(backend: str, device: int | None) -> None:
     """Checks libraries, driver, context and a picture, in plain words. Exit code 5 where no picture can be drawn."""
@@ -34,12 +34,18 @@ def command(backend: str, device: int | None) -> None:
 def _devices() -> str:
     import sys
 
+    from glshade.errors import GlshadeError
     from glshade.gl.context import LIBEGL, devices
 
     if not sys.platform.startswith("linux"):
         return "EGL: not used on this platform"
+    try:
+        found = devices()
+    except GlshadeError as error:
+        # Not the end: OSMesa may serve.
+        return f"EGL: {error}"
     return f"EGL: {LIBEGL} loads; " + "; ".join(
-        f"device {d.index}: {d.vendor} ({'software' if d.is_software else 'hardware'})" for d in devices()
+        f"device {d.index}: {d.vendor} ({'software' if d.is_software else 'hardware'})" for d in found
     )
 
 

@@ -39,7 +39,7 @@ class Size(click.ParamType[tuple[int, int]]):
     help="Per face, per vertex or per pixel, for the whole picture.",
 )
 @click.option("--exposure", type=float, help="Overrides the film's exposure [stops].")
-@click.option("--backend", type=click.Choice(["auto", "egl", "standalone"]), default="auto", show_default=True)
+@click.option("--backend", type=click.Choice(["auto", "egl", "osmesa", "standalone"]), default="auto", show_default=True)
 @click.option("--device", type=int, help="EGL device, as `glshade devices` counts them.")
 def command(
     scene: Path,

@@ -1,7 +1,7 @@
 """Context: an OpenGL context without a window, and the one call that moderngl does not wrap.
 
 On Linux through EGL (`libEGL.so.1` by its versioned name: machines without development packages have no other). Elsewhere
-`auto` falls back to moderngl's own standalone context.
+`auto` falls back to moderngl's own standalone context. Without EGL, Mesa's OSMesa serves (osmesa.py); one backend a process.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import moderngl
 
 from glshade.errors import ContextError
 
-Backend = Literal["auto", "egl", "standalone"]
-BACKENDS: tuple[Backend, ...] = ("auto", "egl", "standalone")
+Backend = Literal["auto", "egl", "osmesa", "standalone"]
+BACKENDS: tuple[Backend, ...] = ("auto", "egl", "osmesa", "standalone")
 LIBEGL = "libEGL.so.1"
 REQUIRED_VERSION = 330
 
@@ -43,6 +43,10 @@ class Device:
     def is_software(self) -> bool:
         """Whether the device is the CPU."""
         return "EGL_MESA_device_software" in self.extensions
+
+
+# The backends that this process has had contexts of.
+_opened: set[str] = set()
 
 
 class Context:
@@ -98,8 +102,18 @@ def open_context(backend: Backend = "auto", device: int | None = None) -> Contex
     """
     if backend not in BACKENDS:
         raise ContextError(f"unknown backend {backend!r}; allowed: {', '.join(BACKENDS)}")
-    if backend == "egl" or (backend == "auto" and sys.platform.startswith("linux")):
-        return _open_egl(device)
+    on_linux = sys.platform.startswith("linux")
+    if backend == "egl" or (backend == "auto" and on_linux):
+        try:
+            return _open_egl(device)
+        except ContextError as error:
+            if backend == "egl" or device is not None:
+                raise
+            return _open_osmesa(instead_of=error)
+    if backend == "osmesa":
+        if device is not None:
+            raise ContextError("only EGL has devices to choose from; leave --device out")
+        return _open_osmesa()
     if device is not None:
         raise ContextError("only EGL has devices to choose from; leave --device out")
     try:
@@ -123,12 +137,34 @@ def _open_egl(device: int | None) -> Context:
             raise ContextError(f"there is no EGL device {device}: `glshade devices` lists {count}") from None
         raise ContextError(f"EGL gives no OpenGL {REQUIRED_VERSION / 100:.1f} context ({error}); {ADVICE}") from None
 
+    _opened.add("egl")
+
     def procedure(name: str) -> int | None:
         egl.eglGetProcAddress.restype = ctypes.c_void_p
         address: int | None = egl.eglGetProcAddress(name.encode())
         return address
 
     return Context(gl, "egl", procedure)
+
+
+def _open_osmesa(instead_of: ContextError | None = None) -> Context:
+    """instead_of: what is raised where OSMesa is not to be had either."""
+    # EGL's context stays entangled with the thread; entering OSMesa afterwards crashes in the driver.
+    if "egl" in _opened:
+        raise instead_of or ContextError("this process has used EGL already; OSMesa needs a process of its own")
+    from glshade.gl.osmesa import OSMesa
+
+    try:
+        own = OSMesa(REQUIRED_VERSION)
+    except ContextError as error:
+        raise instead_of or error from None
+    settings: dict[str, Any] = {"context": own, "require": REQUIRED_VERSION}
+    try:
+        gl = moderngl.create_context(standalone=True, **settings)
+    except Exception as error:
+        raise ContextError(f"OSMesa gives no OpenGL {REQUIRED_VERSION / 100:.1f} context ({error})") from None
+    _opened.add("osmesa")
+    return Context(gl, "osmesa", own.load_opengl_function)
 
 
 def load_egl() -> ctypes.CDLL:

@@ -338,13 +338,15 @@ class Renderer:
 
     def _frame(self, size: tuple[int, int], storage: Storage, samples: int) -> Frame:
         key = (size, storage, samples)
-        if key not in self._frames:
+        # The one used last stands last; the one that is being drawn into is never the first.
+        frame = self._frames.pop(key, None)
+        if frame is None:
             if len(self._frames) > 2:
-                for frame in self._frames.values():
-                    frame.release()
-                self._frames.clear()
-            self._frames[key] = Frame(self.context, size, storage, samples)
-        return self._frames[key]
+                # Not released: what is forgotten is collected, and moderngl stumbles over what is both.
+                self._frames.pop(next(iter(self._frames)))
+            frame = Frame(self.context, size, storage, samples)
+        self._frames[key] = frame
+        return frame
 
     def _buffer(self, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
         """An array for a picture: one that no image holds any more, else a new one, which costs a page fault every 4 KiB."""

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import math
+import tomllib
 from pathlib import Path
 from typing import Any
 
+import jsonschema
 import numpy as np
 import pytest
 
@@ -196,15 +198,15 @@ def test_extensions_in_capitals(name: str, tmp_path: Path) -> None:
     assert load(write(tmp_path / name, TOML if "TOML" in name else TRIANGLE)).objects
 
 
+@pytest.fixture(scope="module")
+def validator() -> Any:
+    schema = Scene.model_json_schema()
+    jsonschema.Draft202012Validator.check_schema(schema)
+    return jsonschema.Draft202012Validator(schema)
+
+
 class TestSchema:
     """`glshade schema`, as an editor uses it."""
-
-    @pytest.fixture(scope="class")
-    def validator(self) -> Any:
-        jsonschema = pytest.importorskip("jsonschema", reason="dev extra")
-        schema = Scene.model_json_schema()
-        jsonschema.Draft202012Validator.check_schema(schema)
-        return jsonschema.Draft202012Validator(schema)
 
     def test_accepts_what_loads(self, validator: Any) -> None:
         validator.validate(TABLE)
@@ -228,8 +230,6 @@ class TestSchema:
         validator.validate(scene)
 
     def test_accepts_the_scenes_that_ship(self, validator: Any) -> None:
-        import tomllib
-
         scenes = sorted((Path(__file__).parents[2] / "scenes").glob("**/*.toml"))
         assert scenes, "no scene ships"
         for path in scenes:
