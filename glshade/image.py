@@ -145,22 +145,29 @@ def _write(path: Path, image: Image) -> None:
     spec.attribute("Software", "glshade")
     for name, value in image.attributes.items():
         spec.attribute(name, value)
+    if not path.parent.is_dir():
+        raise GlshadeError(f"{path}: the folder {path.parent} does not exist; make it first")
     beside = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    output = oiio.ImageOutput.create(str(beside))
     try:
+        output = oiio.ImageOutput.create(str(beside))
         if output is None:
-            raise GlshadeError(f"{path}: {oiio.geterror()}")
-        if not path.parent.is_dir():
-            raise GlshadeError(f"{path}: the folder {path.parent} does not exist; make it first")
+            raise GlshadeError(f"{path}: cannot be written: {_one_line(oiio.geterror())}")
         written = output.open(str(beside), spec) and output.write_image(np.ascontiguousarray(pixels))
-        if not (output.close() and written):
-            raise GlshadeError(f"{path}: cannot be written: {(output.geterror() or oiio.geterror()).strip()}")
-        try:
-            os.replace(beside, path)
-        except OSError as error:
-            raise GlshadeError(f"{path}: cannot be written: {error.strerror}") from None
+        # A full disk may show in the message alone: what was buffered is written when the file is closed. (TIFF's message
+        # may be of an Exif table that it could not make, which is no loss.)
+        closed = output.close()
+        message = _one_line(output.geterror())
+        if not (closed and written) or (message and "Exif" not in message):
+            raise GlshadeError(f"{path}: cannot be written: {message or _one_line(oiio.geterror())}")
+        os.replace(beside, path)
+    except OSError as error:
+        raise GlshadeError(f"{path}: cannot be written: {error.strerror}") from None
     finally:
         beside.unlink(missing_ok=True)
+
+
+def _one_line(message: str) -> str:
+    return "; ".join(line.strip() for line in message.splitlines() if line.strip())
 
 
 def read(path: str | Path, encoding: Literal["auto", "srgb", "linear"] = "auto") -> tuple[NDArray[np.float32], bool]:
@@ -174,10 +181,10 @@ def read(path: str | Path, encoding: Literal["auto", "srgb", "linear"] = "auto")
     config.attribute("oiio:UnassociatedAlpha", 1)
     source = oiio.ImageInput.open(str(path), config)
     if source is None:
-        raise AssetError(f"{path}: cannot be read as a picture: {oiio.geterror().strip()}")
+        raise AssetError(f"{path}: cannot be read as a picture: {_one_line(oiio.geterror())}")
     spec = source.spec()
     pixels = source.read_image(oiio.FLOAT)
-    message = source.geterror().strip()
+    message = _one_line(source.geterror())
     source.close()
     if pixels is None or message:
         raise AssetError(f"{path}: cannot be read as a picture: {message or 'no pixels'}")
@@ -190,4 +197,7 @@ def read(path: str | Path, encoding: Literal["auto", "srgb", "linear"] = "auto")
     if colour.shape[2] < 3:
         colour = np.repeat(colour[..., :1], 3, axis=2)
     alpha = pixels[..., -1:] if has_alpha else np.ones_like(colour[..., :1])
+    if has_alpha and not spec.get_int_attribute("oiio:UnassociatedAlpha"):
+        # OpenEXR's colours are premultiplied.
+        colour = np.divide(colour, alpha, out=colour.copy(), where=alpha > 0)
     return np.concatenate([colour[..., :3], alpha], axis=2), has_alpha

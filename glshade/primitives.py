@@ -10,10 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from glshade.mesh import Array, Float64, Mesh, in_local_order
-
-# Above this many triangles a mesh no longer fits the caches and its order begins to count.
-ORDERED_ABOVE = 1000
+from glshade.mesh import Array, Float64, Mesh, ordered
 
 
 def sphere(segments: int = 64, rings: int = 32) -> Mesh:
@@ -54,14 +51,27 @@ def icosphere(subdivisions: int = 4) -> Mesh:
         ]
     )
     p /= np.linalg.norm(p, axis=1, keepdims=True)
+    sides = np.sort(np.stack([t, np.roll(t, -1, axis=1)], axis=2), axis=2)  # (T, 3, 2): ab, bc, ca
+    ends, edge = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
+    edge = edge.reshape(-1, 3)
+    # Edges are numbered along with the triangles: to find them again each time would take longer than all the rest.
     for _ in range(subdivisions):
-        edges = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
-        key, which = np.unique(edges[:, 0] << 32 | edges[:, 1], return_inverse=True)
-        middle = p[key >> 32] + p[key & 0xFFFFFFFF]
-        middle /= np.linalg.norm(middle, axis=1, keepdims=True)
-        ab, bc, ca = len(p) + which.reshape(3, -1)
-        a, b, c = t.T
+        middle = p[ends[:, 0]] + p[ends[:, 1]]
+        middle /= np.sqrt(np.square(middle).sum(axis=1, keepdims=True))
+        (a, b, c), (ab, bc, ca) = t.T, len(p) + edge.T
+        first = ends[:, 0][edge]
+        # Edge e splits into 2e, at its first end, and 2e + 1.
+        a_ab, b_bc, c_ca = 2 * edge.T + (t != first).T
+        b_ab, c_bc, a_ca = 2 * edge.T + (t == first).T
+        inner = 2 * len(ends) + np.arange(3 * len(t)).reshape(3, -1)
+        at_a, at_b, at_c = inner
+        new = len(p) + np.arange(len(ends))
+        halves = np.stack([ends[:, 0], new, ends[:, 1], new], axis=1).reshape(-1, 2)
+        across = [np.stack(x, axis=1) for x in ((ab, ca), (bc, ab), (ca, bc))]
         t = np.concatenate([np.stack(x, axis=1) for x in ((a, ab, ca), (b, bc, ab), (c, ca, bc), (ab, bc, ca))])
+        four = ((a_ab, at_a, a_ca), (b_bc, at_b, b_ab), (c_ca, at_c, c_bc), (at_b, at_c, at_a))
+        edge = np.concatenate([np.stack(x, axis=1) for x in four])
+        ends = np.concatenate([halves, *across])
         p = np.concatenate([p, middle])
     return _mesh(p, t, p, None)
 
@@ -153,9 +163,12 @@ def _at_least(shape: str, **counts: tuple[int, int]) -> None:
 
 
 def _mesh(positions: Float64, triangles: Array, normals: Float64, uvs: Float64 | None) -> Mesh:
-    used, corners = np.unique(triangles, return_inverse=True)  # a pole has one copy fewer than its ring has columns
-    mesh = Mesh.build(positions[used], corners.reshape(-1, 3), normals[used], None if uvs is None else uvs[used])
-    return in_local_order(mesh) if len(mesh.triangles) > ORDERED_ABOVE else mesh
+    used = np.zeros(len(positions), dtype=bool)
+    used[triangles] = True
+    if not used.all():  # a pole has one copy fewer than its ring has columns
+        triangles = (np.cumsum(used) - 1)[triangles]
+        positions, normals, uvs = positions[used], normals[used], None if uvs is None else uvs[used]
+    return ordered(Mesh.build(positions, triangles, normals, uvs))
 
 
 def _circle(segments: int, offset: float = 0.0) -> Float64:

@@ -142,7 +142,13 @@ def _varyings(plan: ProgramPlan, direction: str) -> str:
     names = _wanted(plan)
     if plan.alpha_from and "uv" not in names:
         names.append("uv")
-    return "".join(f"{direction} {TYPES[name]} v_{name};\n" for name in names)
+    return "".join(f"{_varying(name, direction)}\n" for name in names)
+
+
+def _varying(name: str, direction: str) -> str:
+    """centroid: with several samples a pixel, the middle of one at the rim may lie outside the triangle, where an attribute
+    is extrapolated: negative light, stray highlights."""
+    return f"centroid {direction} {TYPES[name]} v_{name};"
 
 
 def _transforms(plan: ProgramPlan) -> str:
@@ -293,7 +299,7 @@ def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
 def _alpha_inputs(plan: ProgramPlan, direction: str) -> str:
     """What the fragment stage of a per-vertex or per-face program asks of the vertex stage beside its colour."""
     names = ["uv"] * bool(plan.alpha_from) + ["colour"] * (plan.vertex_colours and plan.alpha != "opaque")
-    text = "".join(f"{direction} {TYPES[name]} v_{name};\n" for name in names)
+    text = "".join(f"{_varying(name, direction)}\n" for name in names)
     if direction == "in":
         return text
     declared = _wanted(plan)

@@ -62,7 +62,13 @@ def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
 
 def textures(plan: ProgramPlan, material: Any) -> dict[str, Any]:
     """sampler name -> Texture or NormalMap."""
-    found = {f"u_{name}_texture": getattr(material, name) for name in plan.textured}
+    found = {}
+    for name in plan.textured:
+        texture = getattr(material, name)
+        if texture.encoding == "auto" and not type(material).is_colour(name):
+            # Numbers, not colours: nobody encodes them.
+            texture = texture.model_copy(update={"encoding": "linear"})
+        found[f"u_{name}_texture"] = texture
     if plan.alpha_from:
         found[f"u_{plan.alpha_from}_texture"] = getattr(material, plan.alpha_from)
     if plan.normal_map:

@@ -58,9 +58,10 @@ def command(
     from glshade.scene import Film
     from glshade.scene_file import load
 
-    output = output or Path(f"{scene.stem}.png")
-    check_suffix(output)
+    if output is not None:
+        check_suffix(output)
     loaded = load(scene)
+    output = output or Path(f"{scene.stem}.png")
     wanted = {"size": size, "samples": samples and int(samples), "exposure": exposure}
     changes = {key: value for key, value in wanted.items() if value is not None}
     if changes:

@@ -22,7 +22,7 @@ class Light(Document):
     """What every light has."""
 
     type: str
-    name: str | None = Field(None, description="for messages and --set")
+    name: str | None = Field(None, description="for messages")
     colour: Triple = Field((1.0, 1.0, 1.0), description="linear Rec. 709")
     intensity: Finite = Field(1.0, description="multiplies the colour; negative light takes light away")
     only: tuple[str, ...] | None = Field(None, description="names of the only objects it lights; left out: all")

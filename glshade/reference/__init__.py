@@ -45,10 +45,10 @@ def render(scene: Scene, *, shading: Rate | None = None) -> Image:
 def radiance(scene: Scene, *, shading: Rate | None = None, sampling: Sampling = AT_CENTRE) -> NDArray[Any]:
     """(H, W, 4) float64, linear Rec. 709, premultiplied, row 0 at the top. Arguments and errors as for `render`.
 
-    sampling: how fragments are looked at; which of them are seen is decided in float64 and at the centre.
+    sampling: how fragments are looked at, cut-outs too; what covers a pixel, and which is nearest, is told at its centre.
     """
     inputs = prepare(scene, shading)
-    nearest, layers = resolve(inputs, rasterise(inputs), lambda fragments: is_there(inputs, fragments))
+    nearest, layers = resolve(inputs, rasterise(inputs), lambda fragments: is_there(inputs, fragments, sampling))
     width, height = inputs.size
     picture: NDArray[Any] = np.broadcast_to(inputs.background, (width * height, 4)).astype(sampling.dtype)
     picture[nearest.pixel] = shade(inputs, nearest, sampling)

@@ -240,10 +240,10 @@ class _Edges:
         """(covered, partial) of the points x, y (N,) [1/256 pixel]."""
         distance = self.x[polygon] * (x[:, None] - self.corner_x[polygon])
         distance += self.y[polygon] * (y[:, None] - self.corner_y[polygon])
-        covered: Flags = ((distance > 0) | ((distance == 0) & self.owns[polygon])).all(axis=1)
+        covered = np.all((distance > 0) | ((distance == 0) & self.owns[polygon]), axis=1)
         slack = self.slack[polygon]
-        near: Flags = (distance >= -slack).all(axis=1)
-        full: Flags = ((distance > slack) | ~self.real[polygon]).all(axis=1)
+        near = np.all(distance >= -slack, axis=1)
+        full = np.all((distance > slack) | ~self.real[polygon], axis=1)
         return covered, np.logical_and(near, ~full)
 
 

@@ -82,7 +82,9 @@ def _wrapped(index: NDArray[np.intp], size: NDArray[np.intp], mode: WrapMode) ->
     if mode == "clamp":
         return np.clip(index, 0, size - 1)
     if mode == "repeat":
-        return np.remainder(index, size)
+        wrapped: NDArray[np.intp] = index % size
+        return wrapped
     # There and back again: the second half of a period of 2 size runs backward.
     index = index % (2 * size)
-    return np.minimum(index, 2 * size - 1 - index)
+    there_and_back: NDArray[np.intp] = np.minimum(index, 2 * size - 1 - index)
+    return there_and_back

@@ -27,16 +27,17 @@ vec3 brdf_cos(AshikhminShirley m, Frame f, vec3 l, vec3 v) {
     float NoH = (NoL + NoV) * inverse_H;
     float log_ratio = sin2 < 0.25 ? 0.5 * log1m_over(sin2) : log(NoH) / sin2;
     float lobe = exp((m.pu * hu * hu + m.pv * hv * hv) * log_ratio);
-    // What is not finite here (H = 0, a direction below the horizon) is never selected below.
     float norm = sqrt(m.pu + 1.0) * sqrt(m.pv + 1.0) * (0.125 * INV_PI);
-    vec3 specular = f_schlick(m.ks, LoH) * (norm * lobe * NoL / (LoH * max(NoL, NoV)));
+    float specular = norm * lobe * NoL / (LoH * max(NoL, NoV));
     // 1 - (1 - x/2)^5 by its factors, so that small cosines are not lost in the difference from 1.
     float a = 1.0 - 0.5 * NoL;
     float b = 1.0 - 0.5 * NoV;
     float dl = 0.5 * NoL * (1.0 + a * (1.0 + a * (1.0 + a * (1.0 + a))));
     float dv = 0.5 * NoV * (1.0 + b * (1.0 + b * (1.0 + b * (1.0 + b))));
-    vec3 diffuse = m.kd * (1.0 - m.ks) * (28.0 / 23.0 * INV_PI * dl * dv * NoL);
-    return NoL > 0.0 && NoV > 0.0 ? diffuse + (H2 > 1e-12 ? specular : vec3(0.0)) : vec3(0.0);
+    float diffuse = 28.0 / 23.0 * INV_PI * dl * dv * NoL;
+    // |H|^2 below 1e-12: l = -v to rounding, where no half vector is. What is not finite above is not chosen here.
+    bool lit = NoL > 0.0 && NoV > 0.0;
+    return m.kd * (1.0 - m.ks) * (lit ? diffuse : 0.0) + f_schlick(m.ks, LoH) * (lit && H2 > 1e-12 ? specular : 0.0);
 }
 
 vec3 ambient_reflectance(AshikhminShirley m) {

@@ -17,7 +17,8 @@ vec3 brdf_cos(BlinnPhong m, Frame f, vec3 l, vec3 v) {
     // |H|^2 below 1e-12: l = -v to rounding, where no half vector is.
     float H2 = dot(H, H);
     float lobe = H2 > 1e-12 ? cospow(f.n, H * inversesqrt(max(H2, 1e-12)), m.exponent) : 0.0;
-    return NoL > 0.0 && NoV > 0.0 ? INV_PI * (m.kd * NoL + m.ks * lobe) : vec3(0.0);
+    float lit = NoL > 0.0 && NoV > 0.0 ? INV_PI : 0.0;
+    return m.kd * (lit * NoL) + m.ks * (lit * lobe);
 }
 
 vec3 ambient_reflectance(BlinnPhong m) {

@@ -8,7 +8,7 @@ struct Lambert {
 
 vec3 brdf_cos(Lambert m, Frame f, vec3 l, vec3 v) {
     float NoL = dot(f.n, l);
-    return NoL > 0.0 && dot(f.n, v) > 0.0 ? m.kd * (INV_PI * NoL) : vec3(0.0);
+    return m.kd * (NoL > 0.0 && dot(f.n, v) > 0.0 ? INV_PI * NoL : 0.0);
 }
 
 vec3 ambient_reflectance(Lambert m) {

@@ -15,8 +15,9 @@ vec3 brdf_cos(Phong m, Frame f, vec3 l, vec3 v) {
     float NoL = dot(f.n, l);
     float NoV = dot(f.n, v);
     // r.v = l.(mirror of v), and that mirror is the same for every light.
-    vec3 value = m.kd * NoL + m.ks * cospow(2.0 * NoV * f.n - v, l, m.exponent);
-    return NoL > 0.0 && NoV > 0.0 ? INV_PI * value : vec3(0.0);
+    float lobe = cospow(2.0 * NoV * f.n - v, l, m.exponent);
+    float lit = NoL > 0.0 && NoV > 0.0 ? INV_PI : 0.0;
+    return m.kd * (lit * NoL) + m.ks * (lit * lobe);
 }
 
 vec3 ambient_reflectance(Phong m) {

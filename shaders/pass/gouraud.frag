@@ -2,7 +2,7 @@
 #include <surface>
 #include <output>
 
-in vec3 v_radiance;
+centroid in vec3 v_radiance;
 out vec4 o_colour;
 
 void main() {

@@ -3,7 +3,7 @@
 #include "lib/clip.glsl"
 #include <surface>
 
-out vec3 v_radiance;
+centroid out vec3 v_radiance;
 
 void main() {
     interpolate();

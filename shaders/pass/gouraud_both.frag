@@ -2,8 +2,8 @@
 #include <surface>
 #include <output>
 
-in vec3 v_front;
-in vec3 v_back;
+centroid in vec3 v_front;
+centroid in vec3 v_back;
 out vec4 o_colour;
 
 void main() {

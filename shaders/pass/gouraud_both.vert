@@ -3,8 +3,8 @@
 #include "lib/clip.glsl"
 #include <surface>
 
-out vec3 v_front;
-out vec3 v_back;
+centroid out vec3 v_front;
+centroid out vec3 v_back;
 
 void main() {
     interpolate();
