@@ -65,15 +65,14 @@ class ProgramPlan:
     """What one program holds.
 
     parameters: (name, use) in the struct's order; use may also be the name of the parameter it equals. alpha_from: the
-    parameter whose texture carries alpha.
+    parameter whose texture carries alpha. ambient: constant where it adds the same colour everywhere.
     """
 
     rate: Rate
     brdf: str
     parameters: tuple[tuple[str, str], ...]
     lights: tuple[LightGroup, ...]
-    ambient: bool
-    ambient_white: bool
+    ambient: Literal["none", "constant", "varying"]
     viewer: Literal["perspective", "orthographic"]
     both_sides: bool
     alpha: Literal["opaque", "mask", "blend"]
@@ -104,7 +103,7 @@ class ProgramPlan:
         return tuple(name for name, use in self.parameters if use == "texture")
 
     def __str__(self) -> str:
-        lights = [f"{group.count or 'many'} {group.key}" for group in self.lights] + ["ambient"] * self.ambient
+        lights = [f"{group.count or 'many'} {group.key}" for group in self.lights] + ["ambient"] * (self.ambient != "none")
         extras = [f"{name} textured" for name in self.textured]
         extras += ["normal map"] * self.normal_map + ["vertex colours"] * self.vertex_colours
         extras += ["both sides"] * self.both_sides + [f"alpha {self.alpha}"] * (self.alpha != "opaque")
@@ -151,10 +150,13 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
             continue
         shares = {False: count - white[name, falloff], True: white[name, falloff]}
         groups += [LightGroup(name, falloff, grey, share) for grey, share in shares.items() if share]
+    # Where no texture takes part, ambient light adds one colour, which is worked out beforehand.
+    varies = instance.vertex_colours or any(isinstance(getattr(material, name), Texture) for name in model.parameters())
+    how: Literal["none", "constant", "varying"] = "none" if not ambient else "varying" if varies else "constant"
     parameters = []
     for name, declared in model.parameters().items():
         value = getattr(material, name)
-        used = groups or ambient if declared.lobe == "all" else ambient
+        used = how == "varying" or (groups and declared.lobe == "all")
         if not used:
             use: str = "unused"
         elif value is None and declared.same_as is not None:
@@ -170,8 +172,7 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         brdf=material.brdf,
         parameters=tuple(parameters),
         lights=tuple(groups),
-        ambient=ambient,
-        ambient_white=ambient and all(is_white(light) for light in reached if light.omnidirectional),
+        ambient=how,
         viewer="perspective" if assembly.view.perspective else "orthographic",
         both_sides=instance.back_faces and bool(groups),
         alpha=material.alpha_mode,
@@ -213,7 +214,7 @@ def plan(assembly: Assembly, encoding: Literal["linear", "srgb"]) -> Plan:
         for group in program.lights:
             first = next(i for i in instance.lights if group.holds(assembly.lights[i]))
             reasons.setdefault(f"light {group.key}", assembly.lights[first].name or f"lights[{first}]")
-        if program.ambient:
+        if program.ambient != "none":
             first = next(i for i in instance.lights if assembly.lights[i].omnidirectional)
             reasons.setdefault("light ambient", assembly.lights[first].name or f"lights[{first}]")
     return Plan(tuple(programs), tuple(draws), tuple(reasons.items()))

@@ -268,19 +268,20 @@ FALLOFFS = {"1/r": "inverse", "1/r^2": "inverse_square"}
 def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
     """Everything up to `vec3 radiance(float side)`: what the surface shows to the viewer, linear."""
     text = at.declarations
-    if not (plan.directed or plan.ambient):
-        return text + "\n// No light reaches it.\nvec3 radiance(float side) {\n    return vec3(0.0);\n}\n"
-    text += _material(plan, at)
-    if plan.ambient:
-        text += (
-            '#include "light/ambient.glsl"\nuniform ' + ("float" if plan.ambient_white else "vec3") + " u_ambient_intensity;\n"
-        )
-    ambient = "illuminate(AmbientLight(vec3(u_ambient_intensity))) * ambient_reflectance(m)" if plan.ambient else "vec3(0.0)"
+    struct = BRDFS.class_name(plan.brdf)
+    ambient, shine = "vec3(0.0)", ""
+    if plan.ambient == "constant":
+        text += "uniform vec3 u_ambient_radiance;\n"
+        ambient = "u_ambient_radiance"
+    if plan.ambient == "varying":
+        text += '#include "light/ambient.glsl"\nuniform vec3 u_ambient_intensity;\n'
+        ambient = "illuminate(AmbientLight(u_ambient_intensity)) * ambient_reflectance(m)"
+    if plan.directed or plan.ambient == "varying":
+        text += _material(plan, at)
+        shine = f"    {struct} m = material();\n"
     if not plan.directed:
-        return (
-            text
-            + f"\nvec3 radiance(float side) {{\n    {BRDFS.class_name(plan.brdf)} m = material();\n    return {ambient};\n}}\n"
-        )
+        # Where nothing shines at all, the surface is black, and keeps its place in the picture.
+        return text + f"\nvec3 radiance(float side) {{\n{shine}    return {ambient};\n}}\n"
     text += _frame(plan, at) + f'#include "viewer/{plan.viewer}.glsl"\n#include "lib/horizon.glsl"\n'
     for group in plan.lights:
         text += f'#include "light/{group.type}.glsl"\n'
@@ -288,7 +289,7 @@ def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
             text += f'#include "falloff/{FALLOFFS[group.falloff]}.glsl"\n'
         text += _declared_lights(group)
     position = at.position if plan.positions else "vec3(0.0)"
-    text += f"\nvec3 radiance(float side) {{\n    {BRDFS.class_name(plan.brdf)} m = material();\n    Frame f = frame(side);\n"
+    text += f"\nvec3 radiance(float side) {{\n{shine}    Frame f = frame(side);\n"
     text += f"    vec3 p = {position};\n    vec3 v = above_horizon(viewer(p), f.n);\n    vec3 c = {ambient};\n"
     text += "".join(map(_loop, plan.lights)) + "    return c;\n}\n"
     if plan.rate == "flat" and plan.both_sides:

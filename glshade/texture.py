@@ -29,7 +29,7 @@ class Texture(Document):
     factor: Triple = Field((1.0, 1.0, 1.0), description="multiplies the picture's linear values")
     encoding: Literal["auto", "srgb", "linear"] = Field(
         "auto",
-        description="how the file's numbers are encoded; auto: sRGB for colours held as integers, linear for floats and for scalars",
+        description="the file's encoding; auto: sRGB for colours held as integers, linear for floats and for scalars",
     )
     wrap: Wrap = Field(("repeat", "repeat"), description="what lies outside [0, 1], along u and along v")
 

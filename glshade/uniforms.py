@@ -8,12 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from glshade.assembly import Assembly, Instance
+from glshade.brdfs import Brdf
 from glshade.lights import LIGHTS, Light
 from glshade.plan import LightGroup, ProgramPlan
 from glshade.texture import Texture
@@ -117,12 +119,27 @@ def ambient_intensity(assembly: Assembly, chosen: tuple[int, ...], exposure: flo
     return total
 
 
+def ambient_radiance(instance: Instance, assembly: Assembly, exposure: float) -> Values:
+    """What ambient light adds to a surface of one colour."""
+    model = type(instance.material)
+    values = {name: np.asarray(value, dtype=np.float64) for name, value in parameter_values(instance.material).items()}
+    reflectance = model.ambient_reflectance(SimpleNamespace(**values))
+    return {"u_ambient_radiance": rounded(reflectance * ambient_intensity(assembly, instance.lights, exposure))}
+
+
+def parameter_values(material: Brdf) -> dict[str, Any]:
+    """name -> value, with what is left out filled in."""
+    values = {name: (getattr(material, name), declared.same_as) for name, declared in material.parameters().items()}
+    return {
+        name: getattr(material, same_as) if value is None and same_as else value for name, (value, same_as) in values.items()
+    }
+
+
 def light_uniforms(plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...], exposure: float) -> Values:
     """The lights that are plain uniforms: ambient, and the groups that are counted exactly."""
     values: Values = {}
-    if plan.ambient:
-        intensity = ambient_intensity(assembly, chosen, exposure)
-        values["u_ambient_intensity"] = rounded(intensity[0] if plan.ambient_white else intensity)
+    if plan.ambient == "varying":
+        values["u_ambient_intensity"] = rounded(ambient_intensity(assembly, chosen, exposure))
     for group in plan.lights:
         if not group.count:
             continue

@@ -43,18 +43,19 @@ def plans() -> Iterator[ProgramPlan]:
         unused = tuple((p, "unused") for p in model.parameters())
         textured = parameters[0][0] if use == "texture" else None
         base = ProgramPlan(
-            "phong", name, parameters, groups(1), True, False, "perspective", False, "opaque", None, False, False, "srgb"
+            "phong", name, parameters, groups(1), "varying", "perspective", False, "opaque", None, False, False, "srgb"
         )
         yield base
         for rate, viewer, both in itertools.product(rates, viewers, (False, True)):
             one = replace(base, rate=rate, viewer=viewer, both_sides=both, encoding="linear")
             yield from (replace(one, lights=groups(count)) for count in (0, 1, 3))
-            yield replace(one, ambient=False, lights=groups(1)[:1])
+            yield replace(one, ambient="constant", lights=groups(1)[:1])
             yield replace(one, normal_map=True, vertex_colours=True, alpha="mask", alpha_from=textured)
             yield replace(one, vertex_colours=True, alpha="blend", alpha_from=textured)
             if not both:
-                yield replace(one, lights=(), ambient_white=True)
-                yield replace(one, lights=(), ambient=False, parameters=unused)
+                yield replace(one, lights=())
+                yield replace(one, lights=(), ambient="constant", parameters=unused)
+                yield replace(one, lights=(), ambient="none", parameters=unused)
     for path in sorted((ROOT / "scenes").glob("*.toml")):
         for encoding in ("linear", "srgb"):
             yield from plan(assemble(load(path)), encoding).programs

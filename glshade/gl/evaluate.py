@@ -14,6 +14,7 @@ from glshade.gl.context import Context, open_context
 from glshade.gl.program import Program
 from glshade.source import Source, expand
 from glshade.texture import Texture
+from glshade.uniforms import parameter_values, rounded
 
 On = Literal["reference", "vertex", "fragment"]
 
@@ -29,7 +30,7 @@ def evaluate(brdf: Brdf, l: ArrayLike, v: ArrayLike, on: On = "reference", conte
     l, v = np.broadcast_arrays(np.asarray(l, dtype=np.float32), np.asarray(v, dtype=np.float32))
     if l.shape[-1:] != (3,):
         raise ValueError(f"l and v must have shape (..., 3), not {l.shape}")
-    values = parameter_values(brdf)
+    values = _numbers(brdf)
     if on == "reference":
         wide = SimpleNamespace(**{name: value.astype(np.float64) for name, value in values.items()})
         result: NDArray[Any] = type(brdf).brdf_cos(wide, l.astype(np.float64), v.astype(np.float64))
@@ -49,17 +50,13 @@ def evaluate(brdf: Brdf, l: ArrayLike, v: ArrayLike, on: On = "reference", conte
             opened.release()
 
 
-def parameter_values(brdf: Brdf) -> dict[str, NDArray[np.float32]]:
+def _numbers(brdf: Brdf) -> dict[str, NDArray[np.float32]]:
     """name -> float32 value, as the GPU gets it. Errors: ValueError for a texture."""
-    values = {}
-    for name, declared in brdf.parameters().items():
-        value = getattr(brdf, name)
-        if value is None and declared.same_as is not None:
-            value = getattr(brdf, declared.same_as)
+    values = parameter_values(brdf)
+    for name, value in values.items():
         if isinstance(value, Texture):
             raise ValueError(f"{name} is a texture; evaluate takes numbers")
-        values[name] = np.asarray(value, dtype=np.float32)
-    return values
+    return {name: rounded(value) for name, value in values.items()}
 
 
 def generated(brdf: Brdf) -> dict[str, str]:

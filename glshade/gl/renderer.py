@@ -30,6 +30,7 @@ from glshade.scene import Rate, Scene
 from glshade.source import PAGE, Source, expand, generate
 from glshade.uniforms import (
     Values,
+    ambient_radiance,
     grouped,
     light_pages,
     light_uniforms,
@@ -261,21 +262,22 @@ class Renderer:
             middles = [i.world_from_object[:3, 3] + i.world_from_object[:3, :3] @ _middle(i) for _, i in blended]
             depths = assembly.view.depth(np.array(middles))
             blended = [blended[i] for i in np.argsort(-depths, kind="stable")]
+        exposure = scene.film.exposure
         for plan, instance in (*opaque, *blended):
             key = (plan, instance.lights)
             if key not in shared:
-                exposure = scene.film.exposure
                 shared[key] = (
                     light_uniforms(plan, assembly, instance.lights, exposure),
                     self._pages(plan, assembly, instance.lights, exposure),
                 )
-            yield from self._draw(plan, instance, assembly, *shared[key])
+            yield from self._draw(plan, instance, assembly, exposure, *shared[key])
 
     def _draw(
         self,
         plan: ProgramPlan,
         instance: Instance,
         assembly: Assembly,
+        exposure: float,
         lights: Values,
         pages: list[list[tuple[str, moderngl.Buffer, int]]],
     ) -> Iterator[Draw]:
@@ -287,9 +289,11 @@ class Renderer:
             if index:
                 # What is counted exactly, and ambient light, has been drawn with the first page.
                 many = tuple(group for group, of in zip(_paged(plan), pages, strict=True) if index < len(of))
-                here = replace(plan, lights=many, ambient=False, parameters=_without_ambient(plan))
+                here = replace(plan, lights=many, ambient="none", parameters=_without_ambient(plan))
             program = self._program(generate(here))
             values = object_uniforms(here, instance, assembly.view.eye)
+            if here.ambient == "constant":
+                values |= ambient_radiance(instance, assembly, exposure)
             samplers = [(name, self._texture(texture)) for name, texture in textures(here, instance.material).items()]
             vertices = self._vertices.array(instance.mesh, program, order)
             page = [group[index] for group in pages if index < len(group)]

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glshade import mesh_file
+from glshade import formats, mesh_file
 from glshade.errors import AssetError
+from glshade.formats.polygon import triangulated
 from glshade.mesh import Mesh
-from glshade.mesh_file import AssetWarning, Model, load, triangulated
+from glshade.mesh_file import AssetWarning, Model, load
 
 ROOT = Path(__file__).parents[2]
 MESHES = ROOT.parent / "shared" / "data" / "meshes"
@@ -506,7 +507,7 @@ def no_parser(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: Any) -> None:
         raise AssertionError("the file was parsed again")
 
-    monkeypatch.setattr(mesh_file, "_read", fail)
+    monkeypatch.setattr(formats, "read", fail)
 
 
 def test_the_second_load_is_from_memory_and_a_changed_file_is_not(tmp_path: Path) -> None:
