@@ -99,7 +99,7 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
         material = material.canonical(ambient)
         rate = shading or item.shading
         problems.extend(f"{name}: {problem}" for problem in _needs_uvs(mesh, material))
-        back_faces = _draws_back_faces(item, mesh, material, box, view)
+        back_faces = _draws_back_faces(item, mesh, material, world, box, view)
         tangents = BRDFS[material.brdf].anisotropic or material.normal_map is not None
         ready = _ready(mesh, rate == "flat", item.normals, item.threshold, tangents)
         local = world.copy()
@@ -177,13 +177,17 @@ def _placed(points: Array, world: Array) -> Array:
     return placed
 
 
-def _draws_back_faces(item: Object, mesh: Mesh, material: Brdf, box: Array, view: View) -> bool:
+def _draws_back_faces(item: Object, mesh: Mesh, material: Brdf, world: Array, box: Array, view: View) -> bool:
     """Culling loses nothing where the mesh is solid and seen from outside; else both sides are drawn."""
     sides: Literal["auto", "front", "both"] = item.sides if item.sides != "auto" else material.sides
     if sides != "auto":
         return sides == "both"
-    outside = bool(view.depth(box).min() > view.near) or not view.perspective
-    return not (outside and material.alpha_mode == "opaque" and mesh.is_solid)
+    if material.alpha_mode != "opaque" or not mesh.is_solid:
+        return True
+    # The near plane may cut a solid open. Where it cuts the box, the mesh itself is asked.
+    if view.depth(box).min() > view.near:
+        return False
+    return bool(view.depth(_placed(mesh.positions + mesh.origin, world)).min() <= view.near)
 
 
 def _needs_uvs(mesh: Mesh, material: Brdf) -> Iterator[str]:

@@ -158,7 +158,12 @@ class Camera(Document):
         axes = self.axes(middle)
         half_width, half_height = self.half_size(aspect)
         if self.framing:
-            place, half_width, half_height = self.frame((points - middle) @ axes.T, half_width, half_height, aspect)
+            around = (points - middle) @ axes.T
+            # A speck far from the origin counts as large enough for float64 to tell its sides apart.
+            least = 1e-9 * float(np.abs(middle).max())
+            if np.abs(around).max() < least:
+                around = np.array([[-least] * 3, [least] * 3])
+            place, half_width, half_height = self.frame(around, half_width, half_height, aspect)
             eye = middle + place @ axes
         elif self.matrix is not None:
             eye = np.array(self.matrix)[:3, 3]

@@ -14,7 +14,7 @@ from glshade.mesh import Mesh, face_normals
 Array = NDArray[np.float64]
 
 # Triangles a cluster: small enough to have one direction, large enough that asking costs less than drawing.
-SIZE = 128
+SIZE = 32
 # Below this many triangles there is nothing to gain.
 WORTHWHILE = 4096
 # Rounding and sub-pixel snapping turn triangles that are seen edge-on; a cluster counts as hidden only beyond this sine.

@@ -450,7 +450,7 @@ def _normalised(v: Float64) -> tuple[Float64, Float64]:
         return unit, length * scale
 
 
-def _by_corner(mesh: Mesh, centre: npt.ArrayLike = 0.0) -> list[list[Float64]]:
+def _by_corner(mesh: Mesh, centre: Float64 | float = 0.0) -> list[list[Float64]]:
     """x, y and z (T,) of the first corners, of the second and of the third, relative to `centre`.
 
     Nine arrays, not one of (T, 3, 3): numpy is many times as fast along an axis of a million as along one of three.
@@ -477,12 +477,12 @@ def _area_vectors(mesh: Mesh) -> Float64:
 
 def _corner_angles(mesh: Mesh) -> Float64:
     """(T, 3) [rad]; by atan2, which is as exact for slivers as for other triangles."""
-    p = [mesh.positions.astype(np.float64)[mesh.triangles[:, k]] for k in range(3)]
+    p = _by_corner(mesh)
     area = np.linalg.norm(_area_vectors(mesh), axis=1)
     angles = np.empty((len(area), 3))
     for k in range(3):
-        e1, e2 = p[(k + 1) % 3] - p[k], p[(k + 2) % 3] - p[k]
-        angles[:, k] = np.arctan2(area, np.einsum("ij,ij->i", e1, e2))
+        (x, y, z), (x1, y1, z1), (x2, y2, z2) = p[k], p[k - 2], p[k - 1]
+        angles[:, k] = np.arctan2(area, (x1 - x) * (x2 - x) + (y1 - y) * (y2 - y) + (z1 - z) * (z2 - z))
     return angles
 
 
@@ -553,6 +553,7 @@ def _fans(mesh: Mesh, place: Int64, threshold: float) -> tuple[Int64, int]:
     order = order[tail[order] != head[order]]  # an edge without length joins nothing
     key = key[order]
     n = face_normals(mesh)
+    flat: Array = ~n.any(axis=1)
     # Angles by the chord between unit normals, |n1 - n2| = 2 sin(angle/2): exact for small ones, unlike the cosine.
     angle = np.radians(min(threshold + THRESHOLD_SLACK, 180.0))
     chord2 = 4 * np.sin(angle / 2) ** 2 if angle < np.pi else np.inf
@@ -564,11 +565,11 @@ def _fans(mesh: Mesh, place: Int64, threshold: float) -> tuple[Int64, int]:
         if len(same) == 0:
             break
         e1, e2 = order[same], order[same + step]
-        n1, n2 = n[e1 // 3], n[e2 // 3]
-        difference = n1 - n2
+        t1, t2 = e1 // 3, e2 // 3
+        difference = n.take(t1, axis=0) - n.take(t2, axis=0)
         bend = np.einsum("ij,ij->i", difference, difference)
-        flat = np.einsum("ij,ij->i", n1, n1) * np.einsum("ij,ij->i", n2, n2) == 0
-        smooth = np.where(flat, 2.0, bend) <= chord2
+        bend[flat[t1] | flat[t2]] = 2.0
+        smooth = bend <= chord2
         e1, e2 = e1[smooth], e2[smooth]
         one += [lesser[e1], greater[e1]]
         other += [lesser[e2], greater[e2]]
@@ -628,10 +629,10 @@ def _gather(mesh: Mesh, source: Array, corners: Array, normals: Float64 | None =
     """
 
     def take(array: Float32 | None) -> Float32 | None:
-        return None if array is None else array[source]
+        return None if array is None else array.take(source, axis=0)  # four times as fast as array[source]
 
     return Mesh(
-        positions=mesh.positions[source],
+        positions=mesh.positions.take(source, axis=0),
         triangles=corners.astype(np.uint32).reshape(-1, 3),
         normals=take(mesh.normals) if normals is None else normals.astype(np.float32),
         uvs=take(mesh.uvs),

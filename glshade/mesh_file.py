@@ -67,8 +67,8 @@ def load(path: Path) -> Model:
             raise AssetError(f"{path}: is a folder, not a mesh file")
         stat = path.stat()
         remembered = _memory.get(full)
-        if remembered and remembered.stamps == _stamps(remembered.stamps):
-            return remembered.model
+        if remembered and remembered[1] == _stamps(remembered[1]):
+            return remembered[0]
         data = path.read_bytes()
     except FileNotFoundError:
         raise AssetError(f"{path}: no such file") from None
@@ -87,20 +87,14 @@ def load(path: Path) -> Model:
         warnings.warn(line, AssetWarning, stacklevel=2)
     model = _model(contents, folder)
     stamps = {full: (stat.st_mtime_ns, stat.st_size)} | _stamps(contents.dependencies)
-    _memory[full] = _Remembered(model, stamps)
+    _memory[full] = model, stamps
     return model
 
 
 Stamp: TypeAlias = tuple[int, int] | None
 
-
-@dataclass(frozen=True)
-class _Remembered:
-    model: Model
-    stamps: dict[Path, Stamp]
-
-
-_memory: dict[Path, _Remembered] = {}
+# What this process loaded, and the stamps of all files that it came from.
+_memory: dict[Path, tuple[Model, dict[Path, Stamp]]] = {}
 
 
 def _stamps(paths: Any) -> dict[Path, Stamp]:

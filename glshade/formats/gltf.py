@@ -15,9 +15,8 @@ from glshade.formats import gltf_material
 from glshade.formats.colours import with_alpha
 from glshade.formats.contents import Material
 from glshade.formats.file import File
-from glshade.formats.parser import parsed
+from glshade.formats.parser import parse
 from glshade.mesh import Float64, Mesh
-
 
 _TRIANGLES, _STRIP = 4, 5
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
@@ -64,7 +63,7 @@ def read(file: File) -> None:
         "meshes": meshes,
     }
     resolver = {str(index): data for index, data in enumerate(buffers)}
-    parsed = parsed(file, "gltf", json.dumps(plain).encode(), resolver=resolver, skip_materials=True)
+    parsed = parse("gltf", json.dumps(plain).encode(), resolver=resolver, skip_materials=True)
     geometries = list(parsed["geometry"].values())
     assert len(geometries) == len(kept)
 

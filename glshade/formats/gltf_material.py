@@ -30,18 +30,19 @@ def uv_set(header: dict[str, Any], primitive: dict[str, Any]) -> int:
 
 
 def material(file: File, header: dict[str, Any], buffers: list[bytes], given: dict[str, Any]) -> Material:
-    factor, texture = _base(material)
+    """A glTF material in the scene file's form: its base colour on Lambert, alpha, normal map and sides."""
+    factor, texture = _base(given)
     rgb = [float(x) for x in factor[:3]]
     picture = _texture(file, header, buffers, texture)
     result: Material = {"brdf": "lambert", "kd": rgb}
     if picture:
         result["kd"] = {"texture": picture[0], "factor": rgb, "wrap": picture[1]}
-    mode = material.get("alphaMode", "OPAQUE")
+    mode = given.get("alphaMode", "OPAQUE")
     if mode in ("MASK", "BLEND"):
         result |= {"alpha": float(factor[3]), "alpha_mode": mode.lower()}
         if mode == "MASK":
-            result["alpha_cutoff"] = float(material.get("alphaCutoff", 0.5))
-    normal = material.get("normalTexture")
+            result["alpha_cutoff"] = float(given.get("alphaCutoff", 0.5))
+    normal = given.get("normalTexture")
     picture = _texture(file, header, buffers, normal)
     if normal and picture:
         if normal.get("texCoord", 0) != (texture or {}).get("texCoord", 0):
@@ -49,7 +50,7 @@ def material(file: File, header: dict[str, Any], buffers: list[bytes], given: di
         else:
             scale = float(normal.get("scale", 1.0))
             result["normal_map"] = {"texture": picture[0], "scale": scale, "wrap": picture[1]}
-    if material.get("doubleSided", False):
+    if given.get("doubleSided", False):
         result["sides"] = "both"
     return result
 

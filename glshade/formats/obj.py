@@ -12,7 +12,7 @@ from glshade.formats import mtl
 from glshade.formats.colours import srgb_to_linear, with_alpha
 from glshade.formats.contents import Material
 from glshade.formats.file import File
-from glshade.formats.parser import parsed, triangles
+from glshade.formats.parser import parse, triangles
 from glshade.formats.polygon import triangulated
 from glshade.mesh import Float64
 
@@ -62,7 +62,7 @@ def read(file: File) -> None:
         strict.append(f"o {index}")
         strict += [f"f {line}" for line in faces.lines]
     options = {"skip_materials": True, "group_material": False, "split_objects": True}
-    geometries = parsed(file, "obj", "\n".join(strict).encode(), **options)["geometry"]
+    geometries = parse("obj", "\n".join(strict).encode(), **options)["geometry"]
     materials = _materials_of(file, libraries) if any(key[1] for key in groups) else {}
 
     several_materials = len({key[:2] for key in groups}) > len({key[0] for key in groups})

@@ -11,11 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from glshade.formats.file import File
 from glshade.mesh import Array
 
 
-def parsed(file: File, kind: str, data: bytes, **options: Any) -> dict[str, Any]:
+def parse(kind: str, data: bytes, **options: Any) -> dict[str, Any]:
     """What trimesh's loader makes of the bytes: the keyword arguments for its own constructors."""
     from trimesh.exchange.load import mesh_loaders
 

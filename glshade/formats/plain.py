@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from glshade.formats.file import File
-from glshade.formats.parser import parsed, triangles
+from glshade.formats.parser import parse, triangles
 
 
 def read(file: File) -> None:
     """STL and OFF. STL's normals belong to faces and follow from them; they are not read."""
-    parsed = parsed(file, file.path.suffix[1:].lower(), file.data)
+    parsed = parse(file.path.suffix[1:].lower(), file.data)
     geometries = parsed.get("geometry") or {file.path.stem: parsed}
     for name, geometry in geometries.items():
         if len(geometry.get("vertices", ())) and not len(geometry.get("faces", ())):

@@ -10,13 +10,13 @@ import numpy as np
 from glshade.formats.colours import srgb_to_linear, with_alpha
 from glshade.formats.contents import Material
 from glshade.formats.file import File
-from glshade.formats.parser import parsed, triangles
+from glshade.formats.parser import parse, triangles
 from glshade.mesh import Float64
 
 
 def read(file: File) -> None:
     # fix_texture would renumber the vertices but not their normals and colours.
-    parsed = parsed(file, "ply", file.data, skip_materials=True, fix_texture=False)
+    parsed = parse("ply", file.data, skip_materials=True, fix_texture=False)
     if "vertices" not in parsed:
         raise file.fail("holds no vertices")
     if parsed.get("faces") is None or len(parsed["faces"]) == 0:

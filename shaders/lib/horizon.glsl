@@ -1,10 +1,9 @@
+#include "lib/unit.glsl"
+
 // The direction to the viewer, lifted onto the horizon of n where an interpolated normal has turned away from it.
 // The pixel is seen, so its surface does face the viewer; only n, an average of neighbours, says otherwise. Every model is
 // 0 for a viewer below the horizon, which would draw a black rim round coarse smooth meshes. 1e-3 is far below what a
 // picture shows and far above the rounding of n.v.
 vec3 above_horizon(vec3 v, vec3 n) {
-    float NoV = dot(n, v);
-    float lift = max(1e-3 - NoV, 0.0);
-    // |v + lift n|^2 for unit v and n.
-    return (v + lift * n) * inversesqrt(1.0 + lift * (2.0 * NoV + lift));
+    return unit(v + n * max(1e-3 - dot(n, v), 0.0));
 }

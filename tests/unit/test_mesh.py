@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from glshade import primitives
 from glshade.errors import AssetError
-from glshade.mesh import Mesh, brushed, face_normals, faceted, in_local_order, with_normals, with_tangents
+from glshade.mesh import Mesh, _weld, brushed, face_normals, faceted, in_local_order, with_normals, with_tangents
 
 Array = np.ndarray[Any, Any]
 
@@ -210,6 +210,15 @@ def test_local_order_brings_neighbours_together() -> None:
     assert stride(in_local_order(scattered)) < 0.1 * stride(scattered)
 
 
+def test_a_mesh_in_local_order_stays_the_same_object() -> None:
+    ball = primitives.icosphere(3)
+    assert in_local_order(ball) is ball
+    reread = Mesh.build(ball.positions, ball.triangles)  # as from a cache: nobody says that it is in order
+    assert in_local_order(reread) is reread
+    for wrong in (ball.triangles[::-1], np.roll(ball.triangles, 1, axis=1)):
+        assert in_local_order(Mesh.build(ball.positions, wrong)).triangles.tolist() != wrong.tolist()
+
+
 def test_tangents_follow_the_uvs() -> None:
     floor = with_tangents(primitives.plane(3))
     assert floor.tangents is not None
@@ -341,3 +350,36 @@ def test_is_solid_means_closed_and_wound_outward() -> None:
     corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [-0.0, 0.0, 0.0]]
     signed_zeros = Mesh.build(corners, [[0, 2, 1], [4, 1, 3], [0, 3, 2], [1, 2, 3]])
     assert signed_zeros.is_solid
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=200, deadline=None)
+def test_is_solid_agrees_with_counting_edges(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    p, t = CUBE_POSITIONS * rng.choice([1.0, -1.0]), CUBE_TRIANGLES.copy()
+    for _ in range(rng.integers(0, 3)):
+        k = rng.integers(len(t))
+        changed = [t[k][::-1], np.roll(t[k], 1), [t[k][0], t[k][0], t[k][1]]][rng.integers(3)]
+        t = np.vstack([t, [changed]]) if rng.integers(2) else np.vstack([t[:k], [changed], t[k + 1 :]])
+    mesh = Mesh.build(p, t)
+    places = [tuple(row) for row in (p + 0.0).tolist()]
+    kept = [[places[i] for i in row] for row in t.tolist() if len({places[i] for i in row}) == 3]
+    edges = [(row[i - 1], row[i]) for row in kept for i in range(3)]
+    closed = len(set(edges)) == len(edges) and {(b, a) for a, b in edges} == set(edges)
+    volume = sum(np.linalg.det(np.array(row)) for row in kept)
+    assert mesh.is_solid == (closed and volume > 1e-9)
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=100, deadline=None)
+def test_vertices_are_welded_by_exact_equality(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    # A few values, both zeros, and neighbours of 1 in the last place: many rows are equal, many nearly so.
+    values = np.array([0.0, -0.0, 1.0, np.nextafter(np.float32(1), np.float32(2)), -1.0, 1e-45], dtype=np.float32)
+    p = values[rng.integers(0, len(values), size=(rng.integers(3, 400), 3))]
+    soup = rng.permutation(len(p))[: len(p) // 3 * 3].reshape(-1, 3)
+    welded = with_normals(Mesh.build(p, soup), "smooth", 180)
+    assert len(np.unique(welded.positions + 0, axis=0)) == len(np.unique(p[soup.reshape(-1)] + 0, axis=0))
+    label = _weld(p)
+    _, expected = np.unique(p + 0, axis=0, return_inverse=True)
+    assert len(set(zip(label.tolist(), expected.reshape(-1).tolist(), strict=True))) == label.max() + 1 == expected.max() + 1

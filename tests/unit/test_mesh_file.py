@@ -532,12 +532,14 @@ def test_a_new_process_reads_the_cache(tmp_path: Path, monkeypatch: pytest.Monke
     assert second.parts[0].material == first.parts[0].material
 
 
-def test_the_cache_needs_no_trimesh(tmp_path: Path) -> None:
+def test_the_cache_needs_no_reader(tmp_path: Path) -> None:
     path = written(tmp_path, "a.obj", TRIANGLE + "f 1 2 3\n")
     load(path)
-    code = f"import sys; from glshade import mesh_file; mesh_file.load({str(path)!r}); print('trimesh' in sys.modules)"
+    code = f"import sys; from glshade import mesh_file; mesh_file.load({str(path)!r}); print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=os.environ, capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "False"
+    loaded = set(run.stdout.split())
+    assert "glshade.mesh_file" in loaded
+    assert not loaded & {"trimesh", "glshade.formats.obj", "glshade.formats.parser", "logging", "tempfile"}
 
 
 def test_a_changed_material_file_ends_the_entry(tmp_path: Path) -> None:

@@ -1,0 +1,80 @@
+"""Driver messages, from whichever driver, become file, line and column."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+from glshade import Renderer, ShaderError
+from glshade.gl.context import Context
+from glshade.gl.program import Program, rewrite
+from glshade.source import Source, Stage
+
+STAGE = Stage("a\nb\nc\nd\n", (("x.glsl", 1), ("y.glsl", 7), ("y.glsl", 8), ("<surface>", 3)))
+
+
+@pytest.mark.parametrize(
+    ("log", "expected"),
+    [
+        ("0:2(5): error: `foo' undeclared", ["y.glsl:7:5: error: `foo' undeclared"]),
+        ("0:4(1): warning: unused", ["<surface>:3:1: warning: unused"]),
+        ("0(3) : error C1503: undefined variable \"foo\"", ["y.glsl:8: error C1503: undefined variable \"foo\""]),
+        ("0(3) : warning C7050: might be used", ["y.glsl:8: warning C7050: might be used"]),
+        ("ERROR: 0:1: Use of undeclared identifier 'foo'", ["x.glsl:1: Use of undeclared identifier 'foo'"]),
+        ("WARNING: 0:2: extension is not supported", ["y.glsl:7: extension is not supported"]),
+        ("0:99(1): error: syntax error, unexpected end of file", ["<surface>:3:1: error: syntax error, unexpected end of file"]),
+        (
+            "GLSL Compiler failed\n\nfragment_shader\n===============\n0:2(5): error: one\n0:3(6): error: two\n\n",
+            ["y.glsl:7:5: error: one", "y.glsl:8:6: error: two"],
+        ),
+        ("error: vertex shader output `v' has no match", ["error: vertex shader output `v' has no match"]),
+        ("", []),
+    ],
+)
+def test_messages(log: str, expected: list[str]) -> None:
+    assert rewrite(log, STAGE) == expected
+
+
+def stage(text: str, name: str) -> Stage:
+    return Stage(text, tuple((name, number) for number, _ in enumerate(text.splitlines(), 1)))
+
+
+VERTEX = "#version 330 core\nin vec3 a_p;\nuniform mat4 u_b_from_a;\nvoid main() {\n    gl_Position = u_b_from_a * vec4(a_p, 1.0);\n}\n"
+FRAGMENT = "#version 330 core\nuniform float u_x;\nuniform float u_none;\nout vec4 o;\nvoid main() {\n    o = vec4(u_x);\n}\n"
+
+
+@pytest.fixture
+def context(renderer: Renderer) -> Iterator[Context]:
+    """The renderer's context, made current."""
+    with renderer.context.gl:
+        yield renderer.context
+
+
+def test_the_stage_at_fault_is_named(context: Context) -> None:
+    with pytest.raises(ShaderError, match=r"^f\.frag:6:\d+: .*u_y"):
+        Program(context, Source(stage(VERTEX, "v.vert"), stage(FRAGMENT.replace("vec4(u_x)", "vec4(u_y)"), "f.frag")))
+    with pytest.raises(ShaderError, match=r"^v\.vert:5:\d+: .*a_q"):
+        Program(context, Source(stage(VERTEX.replace("vec4(a_p", "vec4(a_q"), "v.vert"), stage(FRAGMENT, "f.frag")))
+
+
+def test_stages_that_do_not_fit(context: Context) -> None:
+    vertex = VERTEX.replace("void main() {", "out vec3 v_x;\nvoid main() {\n    v_x = a_p;")
+    fragment = FRAGMENT.replace("out vec4 o;", "in vec4 v_x;\nout vec4 o;").replace("vec4(u_x)", "v_x * u_x")
+    with pytest.raises(ShaderError, match="v_x") as caught:
+        Program(context, Source(stage(vertex, "v.vert"), stage(fragment, "f.frag")))
+    assert "==" not in str(caught.value)
+
+
+def test_uniforms_and_attributes(context: Context) -> None:
+    program = Program(context, Source(stage(VERTEX, "v.vert"), stage(FRAGMENT, "f.frag")))
+    assert set(program.uniforms) == {"u_b_from_a", "u_x"}, "what the driver dropped is not there"
+    assert program.attributes == ("a_p",)
+    matrix = np.arange(16, dtype=np.float32).reshape(4, 4)
+    program.write("u_b_from_a", matrix)
+    program.write("u_x", np.float32(0.5))
+    program.write("u_none", np.float32(1))
+    # GL has columns first: the rows that NumPy has are its columns' entries.
+    assert np.frombuffer(program.members["u_b_from_a"].read(), dtype=np.float32).reshape(4, 4).T.tolist() == matrix.tolist()
+    assert program.members["u_x"].value == 0.5

@@ -1,0 +1,227 @@
+"""The text of programs: complete, minimal, and every line knows where it came from."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from glshade import Image, Renderer, Scene, ShaderError, explain, source
+from glshade.gl.program import Program
+from glshade.source import Source, expand, generate
+from strategies import LIGHTS_OF_ANY_TYPE, MATERIALS
+
+SUN, SKY = {"type": "directional"}, {"type": "ambient"}
+
+
+def sources(objects: Any, lights: Any = (SUN,), **more: Any) -> list[Source]:
+    objects = [objects] if isinstance(objects, dict) else objects
+    return [generate(p) for p in explain(Scene.model_validate({"objects": objects, "lights": list(lights), **more})).programs]
+
+
+def text(found: Source) -> str:
+    assert found.fragment is not None
+    return found.vertex.text + found.fragment.text
+
+
+def code(glsl: str) -> str:
+    """Without comments, and without what a file declares for others."""
+    glsl = re.sub(r"//.*", "", glsl)
+    return re.sub(r"struct Frame \{.*?\};|vec3 ambient_reflectance\(.*?\n\}", "", glsl, flags=re.S)
+
+
+def one(material: dict[str, Any], lights: Any = (SUN,), **keys: Any) -> str:
+    (found,) = sources({"shape": "sphere", "material": material, **keys}, lights)
+    return text(found)
+
+
+@pytest.mark.parametrize("rate", ["flat", "gouraud", "phong"])
+def test_a_program_holds_only_what_it_needs(rate: str) -> None:
+    lambert = code(one({"brdf": "lambert"}, shading=rate))
+    for word in ("cospow", "exp", "Phong", "ks", "ka", "tangent", "Point", "Spot", "falloff", "ambient(", "sampler", "discard"):
+        assert word not in lambert, word
+    phong = one({"brdf": "phong"}, shading=rate)
+    assert "cospow" in phong
+    assert "ambient" not in code(phong), "nobody asks for ka"
+    assert "ambient" in code(one({"brdf": "phong"}, [SUN, SKY], shading=rate))
+    assert "tangent" in one({"brdf": "ashikhmin_shirley"}, shading=rate)
+    dark = one({"brdf": "phong"}, [], shading=rate)
+    assert "a_normal" not in dark
+    assert "brdf_cos" not in dark
+
+
+def test_every_include_is_there_once() -> None:
+    found = one({"brdf": "ashikhmin_shirley"}, [SUN, SKY, {"type": "spot", "position": [0, 9, 0]}])
+    assert "#include" not in found
+    assert found.count("#version") == 2
+    for stage in found.split("#version")[1:]:
+        functions = re.findall(r"^\w+ (\w+\([^)]*\)) \{", stage, re.M)
+        assert len(functions) == len(set(functions))
+
+
+def test_the_same_plan_is_the_same_text() -> None:
+    first, second = (sources({"shape": "sphere", "material": {"brdf": "phong"}}) for _ in range(2))
+    assert first == second
+    assert hash(first[0]) == hash(second[0])
+
+
+def test_every_line_knows_its_file() -> None:
+    (found,) = sources({"shape": "sphere", "material": {"brdf": "phong"}})
+    files: set[str] = set()
+    for stage in (found.vertex, found.fragment):
+        assert stage is not None
+        lines = stage.text.splitlines()
+        assert len(lines) == len(stage.lines)
+        real = [(line, file, number) for line, (file, number) in zip(lines, stage.lines, strict=True) if not file.startswith("<")]
+        files |= {Path(file).name for _, file, _ in real}
+        for line, file, number in real:
+            assert Path(file).read_text(encoding="utf-8").splitlines()[number - 1] == line
+        assert stage.place(1).endswith(":1")
+        assert stage.place(10**6) == stage.place(len(lines))
+    assert files >= {"phong.glsl", "cospow.glsl", "directional.glsl"}
+
+
+class TestIncludes:
+    """The resolver, on files made for it."""
+
+    def files(self, tmp_path: Path, **content: str) -> Path:
+        for name, body in content.items():
+            (tmp_path / f"{name}.glsl").write_text(body)
+        return tmp_path
+
+    def test_once_and_in_place(self, tmp_path: Path) -> None:
+        root = self.files(tmp_path, main='a\n#include "x.glsl"\n  #include "y.glsl"\nb\n', x='x\n#include "y.glsl"\n', y="y\n")
+        stage = expand("main.glsl", {}, root)
+        assert stage.text == "a\nx\ny\nb\n"
+        assert [stage.place(i) for i in (1, 2, 3, 4)] == [f"{root}/main.glsl:1", f"{root}/x.glsl:1", f"{root}/y.glsl:1", f"{root}/main.glsl:4"]
+
+    def test_a_circle_ends(self, tmp_path: Path) -> None:
+        root = self.files(tmp_path, main='#include "x.glsl"\nm\n', x='#include "main.glsl"\n#include "x.glsl"\nx\n')
+        assert expand("main.glsl", {}, root).text == "x\nm\n"
+
+    def test_generated_text(self, tmp_path: Path) -> None:
+        root = self.files(tmp_path, main="#include <surface>\nm\n", x="x\n")
+        stage = expand("main.glsl", {"surface": 'one\n#include "x.glsl"\ntwo\n'}, root)
+        assert stage.text == "one\nx\ntwo\nm\n"
+        assert [stage.place(i) for i in (1, 2, 3)] == ["<surface>:1", f"{root}/x.glsl:1", "<surface>:3"]
+
+    def test_what_is_not_there(self, tmp_path: Path) -> None:
+        root = self.files(tmp_path, main='a\n#include "unti.glsl"\n', unit="", empty="#include <surfase>\n")
+        with pytest.raises(ShaderError) as caught:
+            expand("main.glsl", {}, root)
+        assert str(caught.value) == f'{root}/main.glsl:2: no shader file "unti.glsl"; did you mean "unit.glsl"?'
+        with pytest.raises(ShaderError, match=r'empty.glsl:1: nothing is generated for <surfase>; did you mean "surface"\?'):
+            expand("empty.glsl", {"surface": ""}, root)
+        with pytest.raises(ShaderError, match='no shader file "none.glsl"'):
+            expand("none.glsl", {}, root)
+
+
+@pytest.fixture
+def shaders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """A copy of the shader folder, in use; programs made before do not count."""
+    copy = tmp_path / "shaders"
+    shutil.copytree(source.SHADERS, copy)
+    monkeypatch.setattr(source, "SHADERS", copy)
+    generate.cache_clear()
+    yield copy
+    generate.cache_clear()
+
+
+@pytest.mark.parametrize("rate", ["flat", "gouraud", "phong"])
+@pytest.mark.parametrize(
+    ("file", "old", "new", "message"),
+    [
+        ("brdf/lambert.glsl", "INV_PI * NoL", "INV_PI * NoLL", r"NoLL"),
+        ("lib/unit.glsl", "return x *", "return x * y *", r"`?'?y'?"),
+        ("lib/clip.glsl", "vec4(p_object, 1.0)", "vec4(p_object, 1.0", r"syntax error|unexpected"),
+    ],
+)
+def test_a_broken_shader_names_its_place(
+    file: str, old: str, new: str, message: str, rate: str, shaders: Path, renderer: Renderer
+) -> None:
+    path = shaders / file
+    lines = path.read_text().splitlines()
+    number = next(i for i, line in enumerate(lines, 1) if old in line)
+    path.write_text(path.read_text().replace(old, new))
+    scene = Scene(objects=[{"shape": "sphere", "shading": rate, "material": {"brdf": "lambert"}}], film={"size": (8, 8)})
+    with pytest.raises(ShaderError) as caught:
+        renderer.render(scene)
+    first = str(caught.value).splitlines()[0]
+    assert re.match(rf"{re.escape(str(path))}:({number}|{number + 1}):\d+: ", first), first
+    assert re.search(message, first)
+
+
+def test_a_broken_include_names_its_place(shaders: Path, renderer: Renderer) -> None:
+    path = shaders / "brdf/lambert.glsl"
+    path.write_text('#include "lib/framee.glsl"\n' + path.read_text())
+    scene = Scene(objects=[{"shape": "sphere", "material": {"brdf": "lambert"}}], film={"size": (8, 8)})
+    with pytest.raises(ShaderError) as caught:
+        renderer.render(scene)
+    assert str(caught.value) == f'{path}:1: no shader file "lib/framee.glsl"; did you mean "lib/frame.glsl"?'
+
+
+def test_the_command_says_the_same(glshade: Any, tmp_path: Path, shaders: Path) -> None:
+    """Exit code 4, one line a message. The package finds the shaders beside itself, so it is copied too."""
+    import glshade as package
+
+    shutil.copytree(Path(package.__file__).parent, tmp_path / "glshade", ignore=shutil.ignore_patterns("__pycache__", "_shaders"))
+    path = shaders / "brdf/lambert.glsl"
+    path.write_text(path.read_text().replace("INV_PI * NoL", "INV_PI * NoLL"))
+    (tmp_path / "s.toml").write_text('[[objects]]\nshape = "sphere"\nmaterial = { brdf = "lambert" }\n')
+    done = glshade("render", "s.toml", "-o", "x.png", cwd=tmp_path, PYTHONPATH=str(tmp_path))
+    assert done.returncode == 4
+    assert done.stderr.startswith(f"glshade: {path}:")
+    assert "Traceback" not in done.stderr
+    assert not (tmp_path / "x.png").exists()
+
+
+@st.composite
+def scenes(draw: st.DrawFn) -> dict[str, Any]:
+    """Scenes over the features that change programs."""
+    material = draw(MATERIALS).model_dump()
+    material["alpha_mode"] = draw(st.sampled_from(["opaque", "mask", "blend"]))
+    shape = draw(st.sampled_from(["sphere", "plane"]))
+    base = next(iter(material.keys() & {"kd", "ka"}))
+    return {
+        "objects": [
+            {
+                "shape": shape,
+                "material": {key: value for key, value in material.items() if value is not None},
+                "shading": draw(st.sampled_from(["flat", "gouraud", "phong"])),
+                "sides": draw(st.sampled_from(["auto", "front", "both"])),
+            }
+        ],
+        "lights": draw(st.lists(LIGHTS_OF_ANY_TYPE, max_size=4)) + draw(st.sampled_from([[], [{"type": "point", "position": [0, 9, 0]}] * 9])),
+        "camera": {"type": draw(st.sampled_from(["perspective", "orthographic"]))},
+        "film": {"size": (4, 4), "samples": draw(st.sampled_from([1, 4]))},
+        "textured": draw(st.sampled_from([(), (base,), ("normal_map",), (base, "normal_map")])),
+    }
+
+
+def declared(stage: str, kind: str) -> set[str]:
+    """Names of uniforms, or of inputs, that a stage declares."""
+    return set(re.findall(rf"^{kind} \w+ (\w+)(?:\[\d+\])?;", stage, re.M))
+
+
+@settings(max_examples=60)
+@given(scene=scenes())
+def test_what_is_declared_is_used(scene: Any, renderer: Renderer, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """A uniform or an attribute that the driver drops was not needed: the plan has let it slip through."""
+    scene = dict(scene)
+    picture = tmp_path_factory.getbasetemp() / "textured.png"
+    if not picture.exists():
+        Image(renderer.render(Scene(objects=[{"shape": "sphere"}], film={"size": (4, 4)})).pixels.copy()).save(picture)
+    for name in scene.pop("textured"):
+        scene["objects"][0]["material"] = scene["objects"][0]["material"] | {name: {"texture": str(picture)}}
+    for plan in explain(Scene.model_validate(scene)).programs:
+        found = generate(plan)
+        with renderer.context.gl:
+            program = Program(renderer.context, found)
+        uniforms = {re.sub(r"[\[.].*", "", name) for name in program.uniforms}
+        assert declared(text(found), "uniform") == uniforms, plan
+        assert declared(found.vertex.text, "in") == set(program.attributes), plan
