@@ -20,7 +20,7 @@ from glshade.brdfs import BRDFS, Brdf
 from glshade.camera import View
 from glshade.errors import SceneError
 from glshade.lights import LIGHTS, Light
-from glshade.mesh import Mesh, faceted, in_local_order, with_normals, with_tangents
+from glshade.mesh import Mesh, faceted, ordered, with_normals, with_tangents
 from glshade.scene import Normals, Object, Rate, Scene
 
 Array = NDArray[np.float64]
@@ -28,10 +28,6 @@ Array = NDArray[np.float64]
 
 # Up to here a camera that frames the scene looks at every vertex; beyond, at boxes, which takes no time and leaves more air.
 FRAMED_EXACTLY = 200_000
-
-
-# Above this many triangles a mesh no longer fits the caches, and its order begins to count.
-ORDERED_ABOVE = 1000
 
 
 @dataclass(frozen=True, eq=False)
@@ -203,5 +199,4 @@ def _ready(mesh: Mesh, flat: bool, normals: Normals, threshold: float, tangents:
     ready = mesh if flat and not tangents else with_normals(mesh, normals, threshold)
     if tangents:
         ready = with_tangents(ready)
-    ready = faceted(ready) if flat else ready
-    return in_local_order(ready) if len(ready.triangles) > ORDERED_ABOVE else ready
+    return ordered(faceted(ready) if flat else ready)

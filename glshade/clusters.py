@@ -28,15 +28,20 @@ def _cones(mesh: Mesh) -> tuple[Array, Array, Array, Array]:
     No normal leaves its axis by more than the sine's angle; a cluster that looks everywhere has a sine above 1.
     """
     count = len(mesh.triangles) // SIZE
-    normals = face_normals(mesh)[: count * SIZE].reshape(count, SIZE, 3)
-    axis = normals.sum(axis=1)
+    # One coordinate at a time: numpy is many times as fast along a long axis as along one of three.
+    x, y, z = (np.ascontiguousarray(n).reshape(count, SIZE) for n in face_normals(mesh)[: count * SIZE].T)
+    axis = np.stack([n.sum(axis=1) for n in (x, y, z)], axis=1)
     axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-30)
-    narrowest = np.einsum("ksi,ki->ks", normals, axis).min(axis=1)
+    narrowest = (x * axis[:, :1] + y * axis[:, 1:2] + z * axis[:, 2:]).min(axis=1)
     sine = np.where(narrowest > 0, np.sqrt(np.maximum(1 - narrowest**2, 0.0)), 2.0)
-    corners = mesh.positions[mesh.triangles[: count * SIZE]].reshape(count, SIZE * 3, 3).astype(np.float64)
-    middle = 0.5 * (corners.min(axis=1) + corners.max(axis=1))
-    radius = np.sqrt(np.square(corners - middle[:, None]).sum(axis=2).max(axis=1))
-    return axis, sine, middle, radius
+    corners = mesh.triangles[: count * SIZE].reshape(-1).astype(np.intp)
+    middle = np.empty((count, 3))
+    square = np.zeros((count, 3 * SIZE))
+    for k in range(3):
+        place = mesh.positions[:, k].astype(np.float64)[corners].reshape(count, -1)
+        middle[:, k] = 0.5 * (place.min(axis=1) + place.max(axis=1))
+        square += np.square(place - middle[:, k, None])
+    return axis, sine, middle, np.sqrt(square.max(axis=1))
 
 
 def facing(instance: Instance, view: View) -> NDArray[np.intp] | None:

@@ -50,7 +50,7 @@ def nearest(name: object, names: Iterable[str]) -> str:
 
 def fault(message: str) -> PydanticCustomError:
     """An error with exactly this message: without a context, pydantic leaves braces alone."""
-    return PydanticCustomError("scene", message)  # type: ignore[arg-type]
+    return PydanticCustomError("scene", message)
 
 
 def shown(value: object) -> str:

@@ -32,6 +32,9 @@ FALLBACK_NORMAL = (0.0, 0.0, 1.0)
 # threshold of 90 must not depend on that.
 THRESHOLD_SLACK = 1e-4
 
+# Tangents either side of a uv seam are one where their sum is longer than this share of their lengths: 18 degrees apart.
+AGREEING = 0.95
+
 # |n x y| below which "across y" no longer gives a direction.
 POLE = 1e-6
 
@@ -278,10 +281,15 @@ def with_tangents(mesh: Mesh) -> Mesh:
     assert split.uvs is not None
     w = np.where(pairs & 1, -1.0, 1.0)
     # Summed over vertices equal in all that matters, so that a file without shared vertices gets the same tangents.
+    weighted = np.repeat(along_u, 3, axis=0) * _corner_angles(mesh).reshape(-1, 1)
     alike = _weld(split.positions, split.normals, split.uvs, w[:, None])
-    total = _sum_by_label(
-        np.repeat(along_u, 3, axis=0) * _corner_angles(mesh).reshape(-1, 1), alike[label], int(alike.max()) + 1
-    )[alike]
+    total = _sum_by_label(weighted, alike[label], int(alike.max()) + 1)[alike]
+    # Across a seam of the uvs too, unless the tangents that meet there differ, as at the poles of a sphere.
+    across = _weld(split.positions, split.normals, w[:, None])
+    joined = _sum_by_label(weighted, across[label], int(across.max()) + 1)
+    lengths = np.bincount(across[label], weights=np.linalg.norm(weighted, axis=1), minlength=len(joined))
+    agree = (np.linalg.norm(joined, axis=1) > AGREEING * lengths)[across]
+    total[agree] = joined[across[agree]]
     n = split.normals.astype(np.float64)
     total = _normalised(total)[0]
     t = total - n * np.einsum("ij,ij->i", n, total)[:, None]
@@ -553,7 +561,7 @@ def _fans(mesh: Mesh, place: Int64, threshold: float) -> tuple[Int64, int]:
     order = order[tail[order] != head[order]]  # an edge without length joins nothing
     key = key[order]
     n = face_normals(mesh)
-    flat: Array = ~n.any(axis=1)
+    flat = np.einsum("ij,ij->i", n, n) == 0
     # Angles by the chord between unit normals, |n1 - n2| = 2 sin(angle/2): exact for small ones, unlike the cosine.
     angle = np.radians(min(threshold + THRESHOLD_SLACK, 180.0))
     chord2 = 4 * np.sin(angle / 2) ** 2 if angle < np.pi else np.inf

@@ -74,7 +74,7 @@ def _mesh(value: Any) -> Any:
         # trimesh computes normals on demand; only those it was given are the mesh's own.
         if "vertex_normals" in getattr(value, "_cache", ()):
             normals = value.vertex_normals
-        visual = getattr(value, "visual", None)
+        visual: Any = getattr(value, "visual", None)
         uvs = getattr(visual, "uv", None)
         if getattr(visual, "kind", None) == "vertex":
             # trimesh holds bytes, sRGB-encoded by custom.

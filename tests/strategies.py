@@ -17,7 +17,9 @@ def numbers(low: float, high: float) -> st.SearchStrategy[float]:
     """Floats within [low, high] that float32 holds: evenly spread where the range is one decade, else over its decades."""
     low32, high32 = float(np.float32(low)), float(np.float32(high))
     if low32 > 0 and high32 > 10 * low32:
-        spread = st.floats(math.log(low32), math.log(high32)).map(lambda x: min(max(float(np.float32(math.exp(x))), low32), high32))
+        spread = st.floats(math.log(low32), math.log(high32)).map(
+            lambda x: min(max(float(np.float32(math.exp(x))), low32), high32)
+        )
         return spread | st.sampled_from([low32, high32])
     return st.floats(low32, high32, width=32)
 

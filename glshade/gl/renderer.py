@@ -212,9 +212,9 @@ class Renderer:
         gl.front_face = "ccw" if mirrored else "cw"
         (gl.enable if blended or added else gl.disable)(moderngl.BLEND)
         if blended or added:
-            over = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
+            one, rest = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
             # Light is added, opacity is not.
-            gl.blend_func = (moderngl.ONE, moderngl.ONE, moderngl.ZERO, moderngl.ONE) if added else over
+            gl.blend_func = (one, one, moderngl.ZERO, one) if added else (one, rest, one, rest)  # type: ignore[assignment]
         # What is added falls on the very surface that its first page has drawn.
         gl.depth_func = "==" if added and not blended else ">"
         gl.fbo.depth_mask = not (blended or added)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from strategies import directions, materials
 
 from glshade import BRDFS, Renderer, evaluate
 from glshade.brdfs import Brdf, Parameter
-from strategies import directions, materials
 
 # A strength without an upper bound is tried up to here.
 STRONG = 1e3

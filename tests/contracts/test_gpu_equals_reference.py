@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from strategies import directions, materials
 
 from glshade import BRDFS, Renderer, evaluate
-from strategies import directions, materials
 
 # float32 has 6e-8; the terms of a model add up to some ten roundings of a value near 1.
 TOLERANCE = 2e-6
@@ -47,7 +47,10 @@ def test_shapes_broadcast(renderer: Renderer) -> None:
         assert value.shape == (3, 5, 3)
         one = evaluate(BRDFS["phong"](), l[1, 0], v[4], on=on, context=renderer.context)  # type: ignore[arg-type]
         assert np.array_equal(value[1, 4], one)
-    assert evaluate(BRDFS["phong"](), np.zeros((0, 3)), np.zeros((0, 3)), on="fragment", context=renderer.context).shape == (0, 3)
+    assert evaluate(BRDFS["phong"](), np.zeros((0, 3)), np.zeros((0, 3)), on="fragment", context=renderer.context).shape == (
+        0,
+        3,
+    )
 
 
 def test_more_directions_than_a_row_of_pixels(renderer: Renderer) -> None:

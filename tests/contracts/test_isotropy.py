@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from strategies import directions, materials
 
 from glshade import BRDFS, Renderer, evaluate
-from strategies import directions, materials
 
 # The parameters that differ between the tangent directions, by model.
 WIDTHS = {"ashikhmin_shirley": ("pu", "pv")}

@@ -1,4 +1,4 @@
-"""Law: the GLSL struct of a light has the fields that its Python class gives values to, in the same order and of the same kind."""
+"""Law: the GLSL struct of a light has the fields that its Python class gives values to, in order and kind."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from strategies import lights
 from test_parameters_agree import struct_fields
 
 from glshade import LIGHTS
 from glshade.lights import Light
-from strategies import lights
 
 
 def a_light(name: str) -> Light:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from strategies import directions, materials
 
 from glshade import BRDFS, evaluate
-from strategies import directions, materials
 
 EXCEPTIONS = {
     "phong": "the lobe is not divided by n.l: the lecture's model, made up, has f cos = ks (r.v)^p",

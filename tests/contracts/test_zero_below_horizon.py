@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from strategies import directions, materials
 
 from glshade import BRDFS, Renderer, evaluate
-from strategies import directions, materials
 
 ABOVE, BELOW = directions(96, 1), directions(96, 2, below=True)
 LEVEL = np.array([[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0.6, -0.8, 0]], dtype=np.float32)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -53,7 +53,13 @@ class TestLight:
         for r in (0.01, 0.5, 2, 1000):
             light = {"type": "point", "position": [0, 0, r], "falloff": falloff, "r_min": 0.25}
             # The square is 1e-3 wide, so its corners are a little farther away: (1e-3 / 0.01)^2 matters at the nearest only.
-            value = draw(tiny, [light], (1, 1), camera={**FRONT, "height": 1e-6, "eye": [3e-4, -2e-4, 5], "target": [3e-4, -2e-4, 0]}, shading="phong")
+            value = draw(
+                tiny,
+                [light],
+                (1, 1),
+                camera={**FRONT, "height": 1e-6, "eye": [3e-4, -2e-4, 5], "target": [3e-4, -2e-4, 0]},
+                shading="phong",
+            )
             assert value == pytest.approx(1 / max(r, 0.25) ** power, rel=2e-3)
             if r >= 0.5:
                 assert draw(tiny, [light], (1, 1), camera={**FRONT, "height": 1e-6}, shading=rate) == pytest.approx(
@@ -79,7 +85,10 @@ class TestLight:
         assert value[0, 0] == 0
 
     def test_exposure_doubles(self, draw: Any) -> None:
-        scene: dict[str, Any] = {"objects": [{"shape": "sphere"}], "lights": [SUN, SKY, {"type": "point", "position": [2, 2, 2]}]}
+        scene: dict[str, Any] = {
+            "objects": [{"shape": "sphere"}],
+            "lights": [SUN, SKY, {"type": "point", "position": [2, 2, 2]}],
+        }
         once, twice, half = (draw(**scene, film={"exposure": stops}) for stops in (0, 1, -1))
         assert twice == pytest.approx(2 * once, rel=ROUNDING)
         assert half == pytest.approx(0.5 * once, rel=ROUNDING)
@@ -92,8 +101,14 @@ class TestLight:
         assert np.all(draw(square(), [dark], camera=FRONT, dtype="uint8") == 0)
 
     def test_light_linking(self, draw: Any) -> None:
-        left, right = (square(name=name, transform={"scale": 0.5, "translate": [x, 0, 0]}) for name, x in (("left", -0.5), ("right", 0.5)))
-        lights = [{**SUN, "only": ["left"], "colour": [1, 0, 0]}, {**SKY, "only": ["right"], "colour": [0, 1, 0]}, {**SKY, "only": []}]
+        left, right = (
+            square(name=name, transform={"scale": 0.5, "translate": [x, 0, 0]}) for name, x in (("left", -0.5), ("right", 0.5))
+        )
+        lights = [
+            {**SUN, "only": ["left"], "colour": [1, 0, 0]},
+            {**SKY, "only": ["right"], "colour": [0, 1, 0]},
+            {**SKY, "only": []},
+        ]
         pixels = draw([left, right], lights, camera=FRONT)[12:20]
         assert pixels[:, 2:14] == pytest.approx(np.broadcast_to([1, 0, 0], (8, 12, 3)), abs=ROUNDING)
         assert pixels[:, 18:30] == pytest.approx(np.broadcast_to([0, 1, 0], (8, 12, 3)), abs=ROUNDING)
@@ -114,7 +129,12 @@ class TestLight:
         ]
         suns = [{**SUN, "direction": [float(c) for c in rng.uniform(-1, 1, 2)] + [-1.0], "intensity": 1 / count}] * count
         lights = [*points, *suns, SKY]
-        scene = {"objects": [{"shape": {"type": "icosphere", "subdivisions": 2}}], "camera": FRONT, "size": (16, 16), "shading": rate}
+        scene = {
+            "objects": [{"shape": {"type": "icosphere", "subdivisions": 2}}],
+            "camera": FRONT,
+            "size": (16, 16),
+            "shading": rate,
+        }
         total = np.zeros((16, 16, 3))
         for start in range(0, len(lights), 7):
             total += draw(lights=lights[start : start + 7], **scene)
@@ -130,7 +150,7 @@ class TestLight:
 class TestSides:
     """Front, back, inside, mirrored."""
 
-    BACK: dict[str, Any] = {**FRONT, "eye": [0, 0, -5]}
+    BACK: ClassVar[dict[str, Any]] = {**FRONT, "eye": [0, 0, -5]}
 
     @pytest.mark.parametrize("rate", RATES)
     def test_an_open_surface_lit_from_one_side(self, rate: str, draw: Any) -> None:
@@ -153,7 +173,12 @@ class TestSides:
         turned = {"rotate": [20, 30, 40], "scale": [mirror, 0.7, 1]}
         lights = [{**SUN, "direction": [-1, -2, -3]}, SKY]
         front, both, auto = (
-            draw({"shape": shape, "transform": turned, "shading": rate, "sides": sides}, lights, (48, 48), film={"background": [0, 0, 0, 0]})
+            draw(
+                {"shape": shape, "transform": turned, "shading": rate, "sides": sides},
+                lights,
+                (48, 48),
+                film={"background": [0, 0, 0, 0]},
+            )
             for sides in ("front", "both", "auto")
         )
         assert front == pytest.approx(both, abs=ROUNDING)
@@ -174,10 +199,18 @@ class TestSides:
         """Everything under one parent of scale (-1, 1, 1), and the light mirrored too: normals, tangents, winding."""
         objects = [
             {"name": "world", "shape": "cone", "transform": {"scale": 0.5, "rotate": [40, 0, 50]}, "material": material},
-            {"shape": "torus", "parent": "world", "transform": {"translate": [0.3, 0.2, 0.9], "rotate": [30, 20, 10]}, "material": material},
+            {
+                "shape": "torus",
+                "parent": "world",
+                "transform": {"translate": [0.3, 0.2, 0.9], "rotate": [30, 20, 10]},
+                "material": material,
+            },
         ]
         lights = [{**SUN, "direction": [-1, -0.5, -1.5]}, {"type": "point", "position": [1.5, 1, 2]}]
-        mirrored = [{"name": "mirror", "shape": "sphere", "transform": {"scale": [-1e-3, 1e-3, 1e-3]}}, *(dict(item) for item in objects)]
+        mirrored = [
+            {"name": "mirror", "shape": "sphere", "transform": {"scale": [-1e-3, 1e-3, 1e-3]}},
+            *(dict(item) for item in objects),
+        ]
         mirrored[1] |= {"parent": "mirror", "transform": {"scale": 500, "rotate": [40, 0, 50]}}
         opposite = [{**SUN, "direction": [1, -0.5, -1.5]}, {"type": "point", "position": [-1.5, 1, 2]}]
         film = {"background": [0, 0, 0, 0]}
@@ -203,22 +236,34 @@ class TestPlace:
         ]
         scene = Scene(objects=chain)
         a, b, c = (item.transform.array() for item in scene.objects)
-        flat = [{"shape": shape, "transform": {"matrix": m.tolist()}} for shape, m in (("cube", a), ("sphere", a @ b), ("cone", a @ b @ c))]
+        flat = [
+            {"shape": shape, "transform": {"matrix": m.tolist()}}
+            for shape, m in (("cube", a), ("sphere", a @ b), ("cone", a @ b @ c))
+        ]
         assert np.array_equal(draw(chain, camera=FRONT), draw(flat, camera=FRONT))
 
     def test_the_nearer_one_is_seen_whatever_the_order(self, draw: Any) -> None:
         for gap in (1.0, 1e-3, 1e-5):
             near = square({"brdf": "ambient", "ka": [1, 0, 0]})
             far = square({"brdf": "ambient", "ka": [0, 1, 0]}, transform={"translate": [0, 0, -gap]})
-            for camera in (FRONT, {"eye": [0, 0, 5], "target": [0, 0, 0], "fov": 20}, {"eye": [0, 0, 5], "near": 1e-3, "far": 1e6, "fov": 20}):
+            for camera in (
+                FRONT,
+                {"eye": [0, 0, 5], "target": [0, 0, 0], "fov": 20},
+                {"eye": [0, 0, 5], "near": 1e-3, "far": 1e6, "fov": 20},
+            ):
                 for objects in ([near, far], [far, near]):
                     assert np.all(draw(objects, [SKY], camera=camera)[16, 16] == [1, 0, 0]), (gap, camera)
 
     def test_far_from_the_origin(self, draw: Any) -> None:
         """Camera-relative: a scene 1e7 away looks as it does here; without that, float32 would have steps of 1."""
+
         def picture(x: float) -> Any:
             camera = {"eye": [x, 0, 5], "target": [x, 0, 0], "fov": 30}
-            return draw({"shape": "torus", "transform": {"translate": [x, 0, 0], "rotate": [60, 0, 0]}}, [{"type": "point", "position": [x + 1, 2, 3]}], camera=camera)
+            return draw(
+                {"shape": "torus", "transform": {"translate": [x, 0, 0], "rotate": [60, 0, 0]}},
+                [{"type": "point", "position": [x + 1, 2, 3]}],
+                camera=camera,
+            )
 
         here, there = picture(0), picture(1e7)
         assert here.max() > 0.01
@@ -242,7 +287,10 @@ class TestPlace:
 class TestRates:
     """Where the model is evaluated."""
 
-    SPHERE: dict[str, Any] = {"shape": {"type": "icosphere", "subdivisions": 1}, "material": {"brdf": "phong", "exponent": 20}}
+    SPHERE: ClassVar[dict[str, Any]] = {
+        "shape": {"type": "icosphere", "subdivisions": 1},
+        "material": {"brdf": "phong", "exponent": 20},
+    }
     LIGHTS: tuple[Any, ...] = ({**SUN, "direction": [-0.3, -0.4, -1]},)
 
     def test_flat_is_one_colour_a_triangle(self, draw: Any) -> None:
@@ -269,7 +317,17 @@ class TestRates:
 
     def test_the_threshold_makes_edges_sharp(self, draw: Any) -> None:
         def cube(threshold: float) -> Any:
-            return draw({"shape": "cube", "normals": "smooth", "threshold": threshold, "transform": {"rotate": [30, 40, 0], "scale": 0.5}}, self.LIGHTS, (64, 64), camera=FRONT)
+            return draw(
+                {
+                    "shape": "cube",
+                    "normals": "smooth",
+                    "threshold": threshold,
+                    "transform": {"rotate": [30, 40, 0], "scale": 0.5},
+                },
+                self.LIGHTS,
+                (64, 64),
+                camera=FRONT,
+            )
 
         sharp, smooth = cube(89), cube(91)
         assert len(np.unique(sharp.round(4).reshape(-1, 3), axis=0)) < 50
@@ -286,7 +344,9 @@ class TestColour:
         pixels = draw({"mesh": mesh, "material": {"brdf": "lambert", "kd": [0.5, 0.25, 1]}}, [SUN], camera=FRONT, shading=rate)
         x = np.broadcast_to((np.arange(32) + 0.5) / 32, (32, 32))
         assert pixels == pytest.approx(np.stack([0.5 * (1 - x), 0.25 * x, 0 * x], axis=2), abs=2 * ROUNDING)
-        plain = draw({"mesh": mesh, "vertex_colours": False, "material": {"brdf": "lambert", "kd": [0.5, 0.25, 1]}}, [SUN], camera=FRONT)
+        plain = draw(
+            {"mesh": mesh, "vertex_colours": False, "material": {"brdf": "lambert", "kd": [0.5, 0.25, 1]}}, [SUN], camera=FRONT
+        )
         assert plain == pytest.approx(np.broadcast_to([0.5, 0.25, 1], (32, 32, 3)), abs=ROUNDING)
 
     def test_flat_takes_the_middle_of_the_colours(self, draw: Any) -> None:
@@ -318,7 +378,9 @@ class TestColour:
     @pytest.mark.parametrize("background", [[0.12, 0.2, 0.35], [0.12, 0.2, 0.35, 0.6]])
     @pytest.mark.parametrize("samples", [1, 2, 4, 8])
     @pytest.mark.parametrize("encoding", ["srgb", "linear"])
-    def test_8_bits_are_the_encoded_float_picture(self, encoding: Any, samples: int, background: Any, renderer: Renderer) -> None:
+    def test_8_bits_are_the_encoded_float_picture(
+        self, encoding: Any, samples: int, background: Any, renderer: Renderer
+    ) -> None:
         scene = Scene(
             objects=[{"shape": "torus", "transform": {"rotate": [50, 0, 0]}}],
             film={"size": (48, 32), "samples": samples, "background": background, "encoding": encoding, "exposure": 0.5},
@@ -333,7 +395,10 @@ class TestColour:
 class TestSamples:
     """Smooth edges."""
 
-    HALF: dict[str, Any] = {**square({"brdf": "ambient", "ka": 1}), "transform": {"rotate": [0, 0, 20], "translate": [-0.9, 0.1, 0], "scale": [1, 4, 1]}}
+    HALF: ClassVar[dict[str, Any]] = {
+        **square({"brdf": "ambient", "ka": 1}),
+        "transform": {"rotate": [0, 0, 20], "translate": [-0.9, 0.1, 0], "scale": [1, 4, 1]},
+    }
 
     @pytest.mark.parametrize(("samples", "least"), [(1, 2), (2, 3), (4, 5), (8, 6)])
     def test_an_edge_has_as_many_steps_as_samples(self, samples: int, least: int, draw: Any) -> None:
@@ -354,7 +419,11 @@ class TestSamples:
     @pytest.mark.parametrize("samples", [1, 2, 4, 8])
     def test_more_samples_measure_the_area_better(self, samples: int, draw: Any) -> None:
         # The disc's own polygon of 64 corners has this area, a quarter of the picture being 1 in radius 0.5.
-        disc = {"shape": {"type": "cylinder", "segments": 64}, "transform": {"rotate": [90, 0, 0], "scale": 0.5}, "material": {"brdf": "ambient", "ka": 1}}
+        disc = {
+            "shape": {"type": "cylinder", "segments": 64},
+            "transform": {"rotate": [90, 0, 0], "scale": 0.5},
+            "material": {"brdf": "ambient", "ka": 1},
+        }
         pixels = draw(disc, [SKY], (32, 32), camera=FRONT, film={"samples": samples})[..., 0].astype(float)
         area = 64 / 2 * math.sin(2 * math.pi / 64) * 0.25 / 4
         # 50 pixels on the edge of 200 inside err by 0.3 each, and in fours, as the disc is symmetric: 4 %.
@@ -365,14 +434,19 @@ class TestSamples:
         assert abs((pixels * i[:, None]).sum() / pixels.sum()) < 0.05
 
 
-SEAMS = pytest.mark.xfail(strict=True, reason="centroid varyings are moved in the pixels along a tile's border: a seam of up to 0.017")
+SEAMS = pytest.mark.xfail(
+    strict=True, reason="centroid varyings are moved in the pixels along a tile's border: a seam of up to 0.017"
+)
 
 
 class TestSize:
     """Tiles, and pictures that no driver draws in one piece."""
 
-    SCENE: dict[str, Any] = {
-        "objects": [{"shape": "torus", "transform": {"rotate": [50, 0, 0]}}, {"shape": "plane", "transform": {"translate": [0, -1, 0], "scale": 3}}],
+    SCENE: ClassVar[dict[str, Any]] = {
+        "objects": [
+            {"shape": "torus", "transform": {"rotate": [50, 0, 0]}},
+            {"shape": "plane", "transform": {"translate": [0, -1, 0], "scale": 3}},
+        ],
         "lights": [{"type": "point", "position": [2, 3, 2], "intensity": 9}, SKY],
         "size": (61, 47),
     }
@@ -401,12 +475,14 @@ class TestSize:
         axis = 0 if size[0] > size[1] else 1
         ramp = SQUARE[:, [axis]] / 2 + 0.5
         mesh = Mesh.build(SQUARE * [size[0] / size[1], 1, 1], TWO, colours=np.c_[ramp, ramp, ramp, np.ones(4)])
-        pixels = draw({"mesh": mesh, "material": {"brdf": "ambient", "ka": 1}}, [SKY], size, camera=FRONT, film={"samples": samples})
+        pixels = draw(
+            {"mesh": mesh, "material": {"brdf": "ambient", "ka": 1}}, [SKY], size, camera=FRONT, film={"samples": samples}
+        )
         assert pixels.shape == (size[1], size[0], 3)
         steps = (np.arange(max(size)) + 0.5) / max(size)
         expected = np.broadcast_to(steps if axis == 0 else steps[::-1, None], (size[1], size[0]))
-        # With several samples, a pixel at the picture's border may be shaded a quarter of a pixel aside.
-        assert np.abs(pixels[..., 0] - expected).max() <= (5e-6 if samples == 1 else 0.26 / max(size))
+        # With several samples, a pixel at the picture's border may be shaded at one of its samples, 0.375 pixels aside.
+        assert np.abs(pixels[..., 0] - expected).max() <= (5e-6 if samples == 1 else 0.38 / max(size))
 
     def test_one_pixel(self, draw: Any) -> None:
         assert draw(square(), [SUN], (1, 1), camera=FRONT) == pytest.approx(1, abs=ROUNDING)
@@ -442,7 +518,9 @@ class TestReuse:
     def test_many_sizes(self, renderer: Renderer) -> None:
         """Frames come and go; the one in use stays."""
         for side in range(3, 40, 3):
-            scene = Scene(objects=[{"shape": "sphere"}], film={"size": (side, 2 * side), "samples": 4, "background": [0, 0, 0, 0]})
+            scene = Scene(
+                objects=[{"shape": "sphere"}], film={"size": (side, 2 * side), "samples": 4, "background": [0, 0, 0, 0]}
+            )
             assert renderer.render(scene).shape == (2 * side, side, 4)
 
     def test_a_scene_changed_is_drawn_anew(self, renderer: Renderer) -> None:

@@ -10,11 +10,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
+from strategies import fitted_cameras, transforms
 
 from glshade import Orthographic, Perspective, Scene
 from glshade.assembly import assemble
 from glshade.camera import CAMERAS, View, window
-from strategies import fitted_cameras, transforms
 
 CUBE = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 ASPECTS = st.sampled_from([0.01, 0.5, 1.0, 16 / 9, 100.0])
@@ -66,7 +66,7 @@ def test_a_fitted_picture_is_filled(kind: str, aspect: float) -> None:
 @pytest.mark.parametrize("kind", CAMERAS)
 @pytest.mark.parametrize("size", [1e-12, 1.0, 1e12])
 def test_of_any_size_and_anywhere(kind: str, size: float) -> None:
-    points = size * (CUBE + [1000, 0, 0])
+    points = size * (CUBE + np.array([1000, 0, 0]))
     frames(CAMERAS[kind]().view(points, 1.5), points)  # type: ignore[attr-defined]
 
 
@@ -116,10 +116,10 @@ def test_looking_along_up_is_not_the_end(up: Any) -> None:
 
 
 def test_fit_keeps_the_direction() -> None:
-    view = Perspective(eye=(0, 0, -1), target=(0, 0, 0), fit=True).view(CUBE + [50, 0, 0], 1.0)
+    view = Perspective(eye=(0, 0, -1), target=(0, 0, 0), fit=True).view(CUBE + np.array([50, 0, 0]), 1.0)
     assert view.axes[2] == pytest.approx([0, 0, -1])
     assert view.eye[:2] == pytest.approx([50, 0])
-    frames(view, CUBE + [50, 0, 0])
+    frames(view, CUBE + np.array([50, 0, 0]))
 
 
 def test_planes_that_are_told_are_kept() -> None:

@@ -37,9 +37,10 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
 
         monkeypatch.setattr(sys, "argv", ["glshade", *map(str, arguments)])
         # main() sends warnings to stderr; pytest would have them as errors.
-        with warnings.catch_warnings(), pytest.raises(SystemExit) as exit:
+        with warnings.catch_warnings():
             warnings.simplefilter("default")
-            main()
+            with pytest.raises(SystemExit) as exit:
+                main()
         out, err = capsys.readouterr()
         assert "Traceback" not in err
         return Result(int(exit.value.code or 0), out, err)
@@ -159,7 +160,9 @@ class TestRender:
     def test_a_mesh_without_texture_coordinates(self, run: Any) -> None:
         image.Image(np.zeros((2, 2, 3), dtype=np.uint8)).save("t.png")
         Path("tri.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-        Path("s.toml").write_text('[[objects]]\nmesh = "tri.obj"\nmaterial = { brdf = "lambert", kd = { texture = "t.png" } }\n')
+        Path("s.toml").write_text(
+            '[[objects]]\nmesh = "tri.obj"\nmaterial = { brdf = "lambert", kd = { texture = "t.png" } }\n'
+        )
         result = run("render", "s.toml", "-o", "x.png")
         assert result.code == 3
         assert "kd is a texture, but its mesh has no texture coordinates" in result.err
@@ -241,7 +244,9 @@ class TestAsAProcess:
         assert len((done.stderr or done.stdout).splitlines()) == 1 or command == "doctor"
         assert pictures(tmp_path) == []
 
-    @pytest.mark.xfail(strict=True, reason="devices() fails inside the handler of the failure, and its message hides the advice")
+    @pytest.mark.xfail(
+        strict=True, reason="devices() fails inside the handler of the failure, and its message hides the advice"
+    )
     @pytest.mark.parametrize("command", ["render", "devices"])
     def test_what_to_do_about_a_broken_driver(self, command: str, glshade: Any, tmp_path: Path) -> None:
         (tmp_path / "s.toml").write_text(SCENE)
@@ -251,10 +256,14 @@ class TestAsAProcess:
 
     def test_a_mesh_is_parsed_once(self, python: Any, tmp_path: Path) -> None:
         """The second run has the mesh from the cache, and does not import trimesh, which takes longer than all the rest."""
-        (tmp_path / "m.stl").write_bytes(b"\0" * 80 + b"\1\0\0\0" + np.float32([0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0]).tobytes() + b"\0\0")
+        (tmp_path / "m.stl").write_bytes(
+            b"\0" * 80 + b"\1\0\0\0" + np.float32([0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0]).tobytes() + b"\0\0"
+        )
         code = (
-            "import sys, warnings; from glshade.cli import main\nsys.argv = ['glshade', 'render', 'm.stl', '--size', '8x8']\n"
-            "try:\n    main()\nexcept SystemExit as e:\n    print(e.code, sorted({'trimesh', 'rich', 'PIL', 'scipy'} & set(sys.modules)))"
+            "import sys; from glshade.cli import main\n"
+            "sys.argv = ['glshade', 'render', 'm.stl', '--size', '8x8']\n"
+            "try:\n    main()\n"
+            "except SystemExit as e:\n    print(e.code, sorted({'trimesh', 'rich', 'PIL', 'scipy'} & set(sys.modules)))"
         )
         cache = str(tmp_path / "cache")
         first = python(code, cwd=tmp_path, XDG_CACHE_HOME=cache).splitlines()[-1]

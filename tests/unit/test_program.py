@@ -20,11 +20,14 @@ STAGE = Stage("a\nb\nc\nd\n", (("x.glsl", 1), ("y.glsl", 7), ("y.glsl", 8), ("<s
     [
         ("0:2(5): error: `foo' undeclared", ["y.glsl:7:5: error: `foo' undeclared"]),
         ("0:4(1): warning: unused", ["<surface>:3:1: warning: unused"]),
-        ("0(3) : error C1503: undefined variable \"foo\"", ["y.glsl:8: error C1503: undefined variable \"foo\""]),
+        ('0(3) : error C1503: undefined variable "foo"', ['y.glsl:8: error C1503: undefined variable "foo"']),
         ("0(3) : warning C7050: might be used", ["y.glsl:8: warning C7050: might be used"]),
         ("ERROR: 0:1: Use of undeclared identifier 'foo'", ["x.glsl:1: Use of undeclared identifier 'foo'"]),
         ("WARNING: 0:2: extension is not supported", ["y.glsl:7: extension is not supported"]),
-        ("0:99(1): error: syntax error, unexpected end of file", ["<surface>:3:1: error: syntax error, unexpected end of file"]),
+        (
+            "0:99(1): error: syntax error, unexpected end of file",
+            ["<surface>:3:1: error: syntax error, unexpected end of file"],
+        ),
         (
             "GLSL Compiler failed\n\nfragment_shader\n===============\n0:2(5): error: one\n0:3(6): error: two\n\n",
             ["y.glsl:7:5: error: one", "y.glsl:8:6: error: two"],
@@ -41,8 +44,21 @@ def stage(text: str, name: str) -> Stage:
     return Stage(text, tuple((name, number) for number, _ in enumerate(text.splitlines(), 1)))
 
 
-VERTEX = "#version 330 core\nin vec3 a_p;\nuniform mat4 u_b_from_a;\nvoid main() {\n    gl_Position = u_b_from_a * vec4(a_p, 1.0);\n}\n"
-FRAGMENT = "#version 330 core\nuniform float u_x;\nuniform float u_none;\nout vec4 o;\nvoid main() {\n    o = vec4(u_x);\n}\n"
+VERTEX = """#version 330 core
+in vec3 a_p;
+uniform mat4 u_b_from_a;
+void main() {
+    gl_Position = u_b_from_a * vec4(a_p, 1.0);
+}
+"""
+FRAGMENT = """#version 330 core
+uniform float u_x;
+uniform float u_none;
+out vec4 o;
+void main() {
+    o = vec4(u_x);
+}
+"""
 
 
 @pytest.fixture

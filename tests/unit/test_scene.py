@@ -10,9 +10,9 @@ import pytest
 import trimesh
 from hypothesis import given
 from pydantic import ValidationError
+from strategies import LIGHTS_OF_ANY_TYPE, MATERIALS, fitted_cameras, transforms
 
 from glshade import BRDFS, LIGHTS, Film, Mesh, Object, Scene, Transform
-from strategies import LIGHTS_OF_ANY_TYPE, MATERIALS, fitted_cameras, transforms
 
 SPHERE = {"shape": "sphere"}
 
@@ -60,7 +60,11 @@ def fault(**keys: Any) -> tuple[str, str]:
         ({"camera": {"fov": "wide"}}, "camera.fov", "must be a number, not 'wide'"),
         ({"camera": {"fit": 1}}, "camera.fit", "must be true or false, not 1"),
         ({"camera": {"up": [0, 0, 0]}}, "camera.up", "must not be the zero vector: it has no direction"),
-        ({"camera": {"eye": [1, 2, 3], "target": [1, 2, 3]}}, "camera.target", "is where the eye is: there is no direction of view"),
+        (
+            {"camera": {"eye": [1, 2, 3], "target": [1, 2, 3]}},
+            "camera.target",
+            "is where the eye is: there is no direction of view",
+        ),
         ({"camera": {"near": 3, "far": 2}}, "camera.near", "3 must be less than far, 2"),
         ({"camera": {"near": 0}}, "camera.near", "must be greater than 0 in a perspective view, not 0"),
         ({"camera": {"type": "orthographic", "height": 0}}, "camera.height", "must be greater than 0, not 0"),
@@ -101,9 +105,17 @@ def fault(**keys: Any) -> tuple[str, str]:
         ({"objects": [{"shape": {"type": "torus", "minor": 1}}]}, "objects.0.shape.minor", "must be less than 1, not 1"),
         ({"objects": [{**SPHERE, "material": "gold"}]}, "objects.0.material", 'no material is named "gold"; allowed: none'),
         ({"objects": [{**SPHERE, "parent": "x"}]}, "objects.0.parent", 'no object is named "x"; allowed: none'),
-        ({"objects": [{**SPHERE, "shading": "fong"}]}, "objects.0.shading", "'fong' is not one of 'flat', 'gouraud' or 'phong'"),
+        (
+            {"objects": [{**SPHERE, "shading": "fong"}]},
+            "objects.0.shading",
+            "'fong' is not one of 'flat', 'gouraud' or 'phong'",
+        ),
         ({"objects": [{**SPHERE, "vertex_colours": "no"}]}, "objects.0.vertex_colours", "must be true or false, not 'no'"),
-        ({"objects": [{**SPHERE, "transform": {"scale": [1, 0, 1]}}]}, "objects.0.transform.scale", "must not be zero along any axis"),
+        (
+            {"objects": [{**SPHERE, "transform": {"scale": [1, 0, 1]}}]},
+            "objects.0.transform.scale",
+            "must not be zero along any axis",
+        ),
         ({"objects": [{**SPHERE, "transform": {"scale": 0}}]}, "objects.0.transform.scale", "must not be zero along any axis"),
         ({"objects": [{"mesh": "/nowhere.obj"}]}, "objects.0.mesh", "/nowhere.obj does not exist"),
         ({"objects": [{"mesh": "/"}]}, "objects.0.mesh", "/ is a folder, not a file"),
@@ -127,7 +139,12 @@ def test_every_fault_at_once() -> None:
                 "materials": {"m": {"brdf": "phong", "kd": -1, "ks": [1], "x": 1}},
                 "objects": [
                     {"shape": "sphere", "name": "a", "parent": "b", "material": "n", "transform": {"rotate": [1, 2]}},
-                    {"mesh": "/nowhere.ply", "name": "b", "parent": "a", "transform": {"scale": 1, "matrix": np.eye(4).tolist()}},
+                    {
+                        "mesh": "/nowhere.ply",
+                        "name": "b",
+                        "parent": "a",
+                        "transform": {"scale": 1, "matrix": np.eye(4).tolist()},
+                    },
                 ],
                 "lights": [{"type": "spot", "inner": 3, "outer": 2, "only": ["c", "a"]}],
             }

@@ -124,7 +124,10 @@ def test_files_that_are_no_scenes(name: str, content: str, message: str, tmp_pat
 
 def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     assert problems(tmp_path / "none.toml") == (f"{tmp_path}/none.toml: there is no such file",)
-    assert "there is no such file" in problems(tmp_path / "none.obj")[0].lower() or "no such file" in problems(tmp_path / "none.obj")[0]
+    assert (
+        "there is no such file" in problems(tmp_path / "none.obj")[0].lower()
+        or "no such file" in problems(tmp_path / "none.obj")[0]
+    )
     (tmp_path / "folder.toml").mkdir()
     assert problems(tmp_path / "folder.toml") == (f"{tmp_path}/folder.toml: cannot be read: Is a directory",)
     (tmp_path / "latin.toml").write_bytes("description = 'ä'".encode("latin-1"))
@@ -155,14 +158,18 @@ def test_every_mesh_that_is_missing_or_broken(tmp_path: Path) -> None:
     for index, (name, problem) in enumerate(zip(names, found, strict=True)):
         assert problem.startswith(f"{tmp_path}/a.json: objects[{index}].mesh: ")
         assert name in problem
-    found = problems(write(tmp_path / "b.json", {"objects": [{"mesh": "no.obj"}, {"mesh": "nix.ply"}, {"mesh": "a.json/x.obj"}]}))
+    found = problems(
+        write(tmp_path / "b.json", {"objects": [{"mesh": "no.obj"}, {"mesh": "nix.ply"}, {"mesh": "a.json/x.obj"}]})
+    )
     assert [problem.split(": ")[1] for problem in found] == [f"objects[{i}].mesh" for i in range(3)]
     assert all("does not exist" in problem for problem in found)
 
 
 @pytest.mark.parametrize("name", ["empty.obj", "points.ply", "empty.stl", "none.glb"])
 def test_a_bare_mesh_without_triangles(name: str, tmp_path: Path) -> None:
-    header = "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n"
+    header = (
+        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n"
+    )
     write(tmp_path / name, header if name.endswith("ply") else "")
     (problem,) = problems(tmp_path / name)
     assert name in problem
@@ -215,7 +222,12 @@ class TestSchema:
         write(tmp_path / "a.png", "")
         write(tmp_path / "a.obj", TRIANGLE)
         texture = {"texture": str(tmp_path / "a.png"), "wrap": "clamp", "factor": 0.5}
-        material = {"brdf": "phong", "kd": texture, "exponent": {**texture, "wrap": ["mirror", "repeat"]}, "normal_map": {**texture}}
+        material = {
+            "brdf": "phong",
+            "kd": texture,
+            "exponent": {**texture, "wrap": ["mirror", "repeat"]},
+            "normal_map": {**texture},
+        }
         del material["normal_map"]["factor"]
         scene = {
             "objects": [
