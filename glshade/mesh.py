@@ -41,7 +41,10 @@ POLE = 1e-6
 # Above this many triangles a mesh no longer fits the caches and its order begins to count.
 ORDERED_ABOVE = 1000
 
-_COLUMNS = {"normals": 3, "uvs": 2, "tangents": 4, "colours": 4, "centroids": 3}
+_COLUMNS = {
+    **{"normals": 3, "uvs": 2, "tangents": 4, "colours": 4},
+    **{"centroids": 3, "centroid_uvs": 2, "centroid_colours": 4},
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +57,8 @@ class Mesh:
     uvs: (V, 2) float32; v = 0 is the bottom of the picture.
     tangents: (V, 4) float32: t, unit and perpendicular to n, and w = +-1 with b = w cross(n, t).
     colours: (V, 4) float32, linear Rec. 709 with straight alpha.
-    centroids: (V, 3) float32, the mean of the triangle's corners; only `faceted` sets it.
+    centroids (V, 3), centroid_uvs (V, 2), centroid_colours (V, 4): float32, of the triangle's corners the mean; only
+    `faceted` sets them.
     origin: (3,) float64. Positions p_object = origin + positions: a mesh far from its origin keeps its shape.
 
     Raises AssetError for arrays whose shapes do not go together.
@@ -68,6 +72,8 @@ class Mesh:
     colours: Float32 | None = None
     origin: Float64 = field(default_factory=lambda: np.zeros(3))
     centroids: Float32 | None = None
+    centroid_uvs: Float32 | None = None
+    centroid_colours: Float32 | None = None
 
     def __post_init__(self) -> None:
         def settle(name: str, dtype: type[Any], columns: int) -> None:
@@ -315,8 +321,8 @@ def brushed(n: npt.ArrayLike) -> Float64:
 def faceted(mesh: Mesh) -> Mesh:
     """The mesh for shading once a triangle: corners unshared, each with its triangle's normal and `centroids`.
 
-    The BRDF is evaluated at the centroid, so uvs, colours and tangents too are the mean of the three corners at each
-    of them; the tangent is made perpendicular to the face's normal.
+    The BRDF is evaluated at the centroid, so each corner carries the mean of the three's uvs and colours beside its own
+    (alpha still varies over the triangle), and of the tangents, made perpendicular to the face's normal.
     """
     split = with_normals(mesh, "face", 0.0)
     assert split.normals is not None
@@ -341,10 +347,10 @@ def faceted(mesh: Mesh) -> Mesh:
         tangents = np.column_stack([t, w]).astype(np.float32)
     return replace(
         split,
-        uvs=single(mean(mesh.uvs)),
-        colours=single(mean(mesh.colours)),
         tangents=tangents,
         centroids=single(mean(mesh.positions)),
+        centroid_uvs=single(mean(mesh.uvs)),
+        centroid_colours=single(mean(mesh.colours)),
     )
 
 
@@ -648,4 +654,6 @@ def _gather(mesh: Mesh, source: Array, corners: Array, normals: Float64 | None =
         colours=take(mesh.colours),
         origin=mesh.origin,
         centroids=take(mesh.centroids),
+        centroid_uvs=take(mesh.centroid_uvs),
+        centroid_colours=take(mesh.centroid_colours),
     )

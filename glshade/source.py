@@ -119,12 +119,15 @@ class _AtVertex:
     """The same in the vertex stage; a flat triangle is shaded at its centroid."""
 
     def __init__(self, plan: ProgramPlan) -> None:
-        place = "a_centroid" if plan.rate == "flat" else "a_position"
-        self.position = f"world({place})"
+        at = "a_centroid_" if plan.rate == "flat" else "a_"
+        self.position = "world(a_centroid)" if plan.rate == "flat" else "world(a_position)"
         self.normal, self.tangent = "world_normal(a_normal)", "world_tangent(a_tangent)"
-        self.uv, self.colour = "a_uv", "a_colour"
-        wanted = _wanted(plan)
-        attributes = [f"in {TYPES[name]} a_{name};" for name in wanted if name != "position"]
+        self.uv, self.colour = f"{at}uv", f"{at}colour"
+        attributes = [
+            f"in {TYPES[name]} {at if name in ('uv', 'colour') else 'a_'}{name};"
+            for name in _wanted(plan)
+            if name != "position"
+        ]
         attributes += ["in vec3 a_centroid;"] * (plan.rate == "flat" and plan.positions)
         self.declarations = "".join(f"{line}\n" for line in attributes) + _transforms(plan)
 
@@ -303,7 +306,7 @@ def _alpha_inputs(plan: ProgramPlan, direction: str) -> str:
     text = "".join(f"{_varying(name, direction)}\n" for name in names)
     if direction == "in":
         return text
-    declared = _wanted(plan)
+    declared = () if plan.rate == "flat" else _wanted(plan)
     attributes = "".join(f"in {TYPES[name]} a_{name};\n" for name in names if name not in declared)
     body = "".join(f"    v_{name} = a_{name};\n" for name in names)
     return attributes + text + f"\nvoid interpolate() {{\n{body}}}\n"

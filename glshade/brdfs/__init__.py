@@ -5,13 +5,15 @@ float64: f cos = BRDF times max(n.l, 0) [1/sr], 0 where n.l <= 0 or n.v <= 0.
 """
 
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, get_args
+from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Discriminator, Field, Tag, ValidationInfo, field_validator
+from pydantic import Discriminator, Field, GetJsonSchemaHandler, Tag, ValidationInfo, field_validator
+from pydantic_core import CoreSchema
 
 from glshade.document import Document, Finite, Triple, fault
 from glshade.found import Found
@@ -86,8 +88,20 @@ class Brdf(Document):
     @classmethod
     def is_colour(cls, name: str) -> bool:
         """Whether the parameter has three channels."""
-        kind = cls.__annotations__[name]
-        return kind == Colour or Colour in get_args(kind)
+        default = cls.model_fields[name].default
+        same_as = cls.parameters()[name].same_as
+        return cls.is_colour(same_as) if default is None and same_as else isinstance(default, tuple)
+
+    @classmethod
+    def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        """The bounds are checked by `_within`; here the schema learns of them."""
+        described = handler(schema)
+        properties = handler.resolve_ref_schema(described)["properties"]
+        for name, declared in cls.parameters().items():
+            # A copy: fields of one kind share what describes them.
+            properties[name] = deepcopy(properties[name])
+            _bound(properties[name], declared)
+        return described
 
     @field_validator("*", mode="after")
     @classmethod
@@ -118,6 +132,17 @@ class Brdf(Document):
     def ambient_reflectance(m: Any) -> Array:
         """(..., 3): what the model reflects of ambient light."""
         raise NotImplementedError
+
+
+def _bound(schema: dict[str, Any], declared: Parameter) -> None:
+    """Adds the bounds to every number that the schema allows."""
+    if schema.get("type") == "number":
+        schema["minimum"] = declared.low
+        if declared.high is not None:
+            schema["maximum"] = declared.high
+    parts = [*schema.get("anyOf", ()), *schema.get("oneOf", ())]
+    for part in [*parts, schema["items"]] if "items" in schema else parts:
+        _bound(part, declared)
 
 
 def above_horizon(l: Array, v: Array, value: Array) -> Array:

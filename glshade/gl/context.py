@@ -132,11 +132,11 @@ def _open_egl(device: int | None) -> Context:
     try:
         gl = moderngl.create_context(standalone=True, **options)
     except Exception as error:
-        count = len(devices())
-        if device is not None and not 0 <= device < count:
-            raise ContextError(f"there is no EGL device {device}: `glshade devices` lists {count}") from None
+        if device is not None:
+            count = len(devices())
+            if not 0 <= device < count:
+                raise ContextError(f"there is no EGL device {device}: `glshade devices` lists {count}") from None
         raise ContextError(f"EGL gives no OpenGL {REQUIRED_VERSION / 100:.1f} context ({error}); {ADVICE}") from None
-
     _opened.add("egl")
 
     def procedure(name: str) -> int | None:
@@ -184,7 +184,9 @@ def devices() -> list[Device]:
     def function(name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
         address = egl.eglGetProcAddress(name.encode())
         if not address:
-            raise ContextError(f"{LIBEGL} has no {name}: it cannot list devices; leave --device out")
+            raise ContextError(
+                f"{LIBEGL} has no {name}, so it cannot list devices: it has found no driver, or an old one; {ADVICE}"
+            )
         return ctypes.CFUNCTYPE(result, *arguments)(address)
 
     pointer, integer = ctypes.c_void_p, ctypes.c_int

@@ -25,9 +25,7 @@ def load() -> ctypes.CDLL:
             return ctypes.CDLL(name)
         except OSError:
             continue
-    raise ContextError(
-        f"{LIBRARIES[0]} cannot be loaded; apt install libosmesa6 (Mesa 25.1 and later have none)"
-    )
+    raise ContextError(f"{LIBRARIES[0]} cannot be loaded; apt install libosmesa6 (Mesa 25.1 and later have none)")
 
 
 class OSMesa:

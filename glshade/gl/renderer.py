@@ -124,19 +124,25 @@ class Renderer:
         if direct and any(draw.added or draw.plan.alpha == "blend" for draw in prepared.draws):
             direct = False
             prepared = self._prepare(scene, shading, "linear")
-        side = min(tile or TILE, self.context.largest_side)
         width, height = film.size
+        side = min(tile or TILE, self.context.largest_side)
+        # At the border of what it draws, a driver moves a centroid to the samples that are there; an apron keeps that out.
+        apron = 2 if film.samples > 1 and max(width, height) > side else 0
+        side = max(side - 2 * apron, 1)
         channels = 3 if opaque else 4
         on_gpu = dtype == "uint8" and len(passes) == 1
         pixels = self._buffer((height, width, 4), np.uint8 if on_gpu else np.float32)
         for x in range(0, width, side):
             for y in range(0, height, side):
-                size = (min(side, width - x), min(side, height - y))
-                whole = size == (width, height)
-                part = pixels if whole else np.empty((size[1], size[0], 4), dtype=pixels.dtype)
-                self._draw_piece(prepared, (x, y), size, passes, direct, part)
-                if not whole:
-                    pixels[y : y + size[1], x : x + size[0]] = part
+                w, h = min(side, width - x), min(side, height - y)
+                if (w, h) == (width, height):
+                    self._draw_piece(prepared, (0, 0), (w, h), passes, direct, pixels)
+                    continue
+                left, top = max(x - apron, 0), max(y - apron, 0)
+                size = (min(x + w + apron, width) - left, min(y + h + apron, height) - top)
+                part = np.empty((size[1], size[0], 4), dtype=pixels.dtype)
+                self._draw_piece(prepared, (left, top), size, passes, direct, part)
+                pixels[y : y + h, x : x + w] = part[y - top :, x - left :][:h, :w]
         encoding = film.encoding if on_gpu else "linear"
         image = Image(pixels[..., :channels], encoding, {} if on_gpu else self._attributes(prepared))
         return image if on_gpu or dtype == "float32" else image.encoded(film.encoding)

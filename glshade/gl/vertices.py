@@ -19,6 +19,8 @@ ATTRIBUTES = {
     "a_uv": ("uvs", 2),
     "a_colour": ("colours", 4),
     "a_centroid": ("centroids", 3),
+    "a_centroid_uv": ("centroid_uvs", 2),
+    "a_centroid_colour": ("centroid_colours", 4),
 }
 # Meshes kept on the GPU; the least recently used leave first.
 KEPT = 4096

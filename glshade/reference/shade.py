@@ -60,10 +60,10 @@ class Surface:
 def shade(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) -> Array:
     """(N, 4): linear Rec. 709, premultiplied, for fragments of any draws in any order. A cut-out's are taken to be there."""
     result = np.zeros((len(fragments), 4), dtype=sampling.dtype)
-    for draw, which, some in _by_draw(inputs, fragments):
+    for draw, which, some in by_draw(inputs, fragments):
         light = _RATES[draw.instance.rate](draw, some, inputs.size, sampling)
         if draw.alpha_mode == "blend":
-            alpha = _alpha(draw, _surface(draw, some, inputs.size, sampling))[:, None]
+            alpha = alpha_of(draw, surface_at(draw, some, inputs.size, sampling))[:, None]
             result[which] = np.concatenate([light * alpha, alpha], axis=1)
         else:
             result[which, :3], result[which, 3] = light, 1.0
@@ -73,9 +73,9 @@ def shade(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) 
 def opacity(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) -> Array:
     """(N,): alpha as the textures and colours say, before a cut-out compares it."""
     result = np.ones(len(fragments), dtype=sampling.dtype)
-    for draw, which, some in _by_draw(inputs, fragments):
+    for draw, which, some in by_draw(inputs, fragments):
         if draw.alpha_mode != "opaque":
-            result[which] = _alpha(draw, _surface(draw, some, inputs.size, sampling))
+            result[which] = alpha_of(draw, surface_at(draw, some, inputs.size, sampling))
     return result
 
 
@@ -86,7 +86,7 @@ def is_there(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTR
     return there
 
 
-def _by_draw(inputs: Inputs, fragments: Fragments) -> Any:
+def by_draw(inputs: Inputs, fragments: Fragments) -> Any:
     """(draw, indices, fragments) in pieces of one draw each."""
     order = np.argsort(fragments.draw, kind="stable")
     bounds = np.searchsorted(fragments.draw[order], np.arange(len(inputs.draws) + 1))
@@ -97,24 +97,24 @@ def _by_draw(inputs: Inputs, fragments: Fragments) -> Any:
 
 
 def _per_pixel(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Array:
-    surface = _surface(draw, fragments, size, sampling)
+    surface = surface_at(draw, fragments, size, sampling)
     sides = draw.instance.back_faces
     side = np.where(fragments.front | (not sides), 1.0, -1.0).astype(sampling.dtype)
-    return _radiance(draw, replace(surface, side=side))
+    return shown(draw, replace(surface, side=side))
 
 
 def _per_vertex(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Array:
     """Shaded at the corners, each for the side that the fragment shows, then interpolated."""
     corners = draw.triangles[fragments.triangle]
-    x, y = _places(fragments, size, sampling)
+    x, y = places(fragments, size, sampling)
     weight = weights(draw, fragments.triangle, x, y, size, derivatives=False).values.astype(sampling.dtype)
     result = np.zeros((len(fragments), 3), dtype=sampling.dtype)
     back = ~fragments.front & draw.instance.back_faces
     for side, which in ((1.0, np.flatnonzero(~back)), (-1.0, np.flatnonzero(back))):
         if len(which):
             vertices, place = np.unique(corners[which], return_inverse=True)
-            surface = _vertices(draw, vertices, sampling.dtype)
-            light = _radiance(draw, replace(surface, side=np.full(len(vertices), side, dtype=sampling.dtype)))
+            surface = at_vertices(draw, vertices, sampling.dtype)
+            light = shown(draw, replace(surface, side=np.full(len(vertices), side, dtype=sampling.dtype)))
             result[which] = blend(weight[which], light[place.reshape(-1, 3)])
     return result
 
@@ -122,18 +122,18 @@ def _per_vertex(draw: Draw, fragments: Fragments, size: tuple[int, int], samplin
 def _per_face(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Array:
     """Shaded once at the centroid; all three corners carry it."""
     faces, place = np.unique(fragments.triangle, return_inverse=True)
-    surface = _vertices(draw, draw.triangles[faces, 2], sampling.dtype, centroids=True)
+    surface = at_vertices(draw, draw.triangles[faces, 2], sampling.dtype, centroids=True)
     if draw.instance.back_faces:
-        facing = np.einsum("ij,ij->i", surface.normal, _viewer(draw, surface.position)) >= 0
+        facing = np.einsum("ij,ij->i", surface.normal, toward_viewer(draw, surface.position)) >= 0
         surface = replace(surface, side=np.where(facing, 1.0, -1.0).astype(sampling.dtype))
-    result: Array = _radiance(draw, surface)[place]
+    result: Array = shown(draw, surface)[place]
     return result
 
 
 _RATES = {"phong": _per_pixel, "gouraud": _per_vertex, "flat": _per_face}
 
 
-def _vertices(draw: Draw, which: NDArray[np.intp], dtype: Any, centroids: bool = False) -> Surface:
+def at_vertices(draw: Draw, which: NDArray[np.intp], dtype: Any, centroids: bool = False) -> Surface:
     """The surface at vertices, or at the centroids that they carry."""
     mesh = draw.instance.mesh
     place = mesh.centroids if centroids and mesh.centroids is not None else mesh.positions
@@ -150,24 +150,25 @@ def _vertices(draw: Draw, which: NDArray[np.intp], dtype: Any, centroids: bool =
         # A mirror turns right-handed frames into left-handed ones.
         hand = -along[:, 3:] if draw.instance.mirrored else along[:, 3:]
         tangent = np.concatenate([turned, hand], axis=1)
-    uv = None if mesh.uvs is None else mesh.uvs[which].astype(dtype)
-    colour = mesh.colours[which].astype(dtype) if draw.instance.vertex_colours and mesh.colours is not None else None
+    uvs, colours = (mesh.centroid_uvs, mesh.centroid_colours) if centroids else (mesh.uvs, mesh.colours)
+    uv = None if uvs is None else uvs[which].astype(dtype)
+    colour = colours[which].astype(dtype) if draw.instance.vertex_colours and colours is not None else None
     return Surface(np.ones(len(position), dtype=dtype), position, normal, tangent, uv, colour)
 
 
-def _places(fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> tuple[Array, Array]:
+def places(fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> tuple[Array, Array]:
     y, x = np.divmod(fragments.pixel.astype(np.intp), size[0])
     return x + 0.5 + sampling.offset[0], y + 0.5 + sampling.offset[1]
 
 
-def _surface(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Surface:
+def surface_at(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Surface:
     """The surface at fragments, interpolated."""
     triangle = fragments.triangle
-    x, y = _places(fragments, size, sampling)
+    x, y = places(fragments, size, sampling)
     textured = bool(draw.samplers) or draw.normal_map is not None
     weight = weights(draw, triangle, x, y, size, derivatives=textured)
     vertices, place = np.unique(draw.triangles[triangle], return_inverse=True)
-    corner = _vertices(draw, vertices, sampling.dtype)
+    corner = at_vertices(draw, vertices, sampling.dtype)
     place = place.reshape(-1, 3)
 
     def at(values: Array | None, by: Array = weight.values) -> Any:
@@ -196,7 +197,7 @@ def _sampled(sampler: Sampler, surface: Surface) -> Array:
     return sampler.sample(surface.uv, sampler.level(*surface.footprint) + surface.level)
 
 
-def _alpha(draw: Draw, surface: Surface) -> Array:
+def alpha_of(draw: Draw, surface: Surface) -> Array:
     value = np.full(len(surface.position), draw.alpha, dtype=surface.position.dtype)
     if draw.alpha_sampler is not None:
         value = value * _sampled(draw.alpha_sampler, surface)[:, 3]
@@ -245,14 +246,14 @@ def _frame(draw: Draw, surface: Surface) -> tuple[Array, Array, Array]:
     return t, b, n
 
 
-def _viewer(draw: Draw, position: Array) -> Array:
+def toward_viewer(draw: Draw, position: Array) -> Array:
     """v (N, 3)."""
     if draw.viewer is None:
         return _unit(-position)
     return np.broadcast_to(draw.viewer.astype(position.dtype), position.shape)
 
 
-def _radiance(draw: Draw, surface: Surface) -> Array:
+def shown(draw: Draw, surface: Surface) -> Array:
     """(N, 3): the sum over the lights of what the points show to the viewer."""
     dtype = surface.position.dtype
     m = _material(draw, surface)
@@ -266,7 +267,7 @@ def _radiance(draw: Draw, surface: Surface) -> Array:
     def local(direction: Array) -> Array:
         return np.stack([np.einsum("ij,ij->i", axis, direction) for axis in (t, b, n)], axis=1)
 
-    v = _viewer(draw, surface.position)
+    v = toward_viewer(draw, surface.position)
     # A pixel that is seen faces the viewer, whatever an average of its neighbours' normals says: lifted to the horizon.
     v = _unit(v + n * np.maximum(HORIZON - np.einsum("ij,ij->i", n, v), 0)[:, None])
     v_local = local(v)

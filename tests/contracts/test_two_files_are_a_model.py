@@ -6,8 +6,6 @@ import shutil
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 import glshade
 
 TOY = '''
@@ -109,15 +107,10 @@ def test_a_toy_model_and_a_toy_light_are_found_and_drawn(tmp_path: Path, python:
     assert python(code, PYTHONPATH=str(tmp_path), cwd=tmp_path) == "True True"
 
 
-IS_COLOUR = "Brdf.is_colour looks at the class's own annotations as they are written"
-
-
-@pytest.mark.xfail(strict=True, reason=IS_COLOUR)
 def test_annotations_may_be_strings(python: Any) -> None:
     assert python("from __future__ import annotations\n" + TOY.split('"""')[2] + "\nprint(Toy.is_colour('tint'))") == "True"
 
 
-@pytest.mark.xfail(strict=True, reason=IS_COLOUR)
 def test_a_model_may_extend_another(python: Any) -> None:
     code = "from glshade.brdfs.phong import Phong\nclass Wide(Phong):\n    pass\n"
     assert python(code + "print(Wide.is_colour('kd'), Wide.is_colour('ka'), Wide.is_colour('exponent'))") == "True True False"

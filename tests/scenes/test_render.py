@@ -434,11 +434,6 @@ class TestSamples:
         assert abs((pixels * i[:, None]).sum() / pixels.sum()) < 0.05
 
 
-SEAMS = pytest.mark.xfail(
-    strict=True, reason="centroid varyings are moved in the pixels along a tile's border: a seam of up to 0.017"
-)
-
-
 class TestSize:
     """Tiles, and pictures that no driver draws in one piece."""
 
@@ -461,7 +456,7 @@ class TestSize:
         assert whole.max() > 0.2
 
     @pytest.mark.parametrize("samples", [2, 4, 8])
-    @pytest.mark.parametrize("rate", ["flat", pytest.param("gouraud", marks=SEAMS), pytest.param("phong", marks=SEAMS)])
+    @pytest.mark.parametrize("rate", RATES)
     def test_tiles_of_several_samples(self, rate: str, samples: int, draw: Any) -> None:
         """A sample may fall to the other side of an edge; nothing else may change."""
         whole = draw(**self.SCENE, film={"samples": samples}, shading=rate)

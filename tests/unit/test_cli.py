@@ -244,9 +244,6 @@ class TestAsAProcess:
         assert len((done.stderr or done.stdout).splitlines()) == 1 or command == "doctor"
         assert pictures(tmp_path) == []
 
-    @pytest.mark.xfail(
-        strict=True, reason="devices() fails inside the handler of the failure, and its message hides the advice"
-    )
     @pytest.mark.parametrize("command", ["render", "devices"])
     def test_what_to_do_about_a_broken_driver(self, command: str, glshade: Any, tmp_path: Path) -> None:
         (tmp_path / "s.toml").write_text(SCENE)

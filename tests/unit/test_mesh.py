@@ -282,17 +282,23 @@ def test_brushed_runs_round_the_y_axis_and_is_defined_at_its_poles() -> None:
 
 
 def test_faceted_carries_one_value_a_triangle() -> None:
-    mesh = faceted(with_tangents(primitives.sphere(12, 6)))
+    whole = with_tangents(primitives.sphere(12, 6))
+    mesh = faceted(whole)
     assert mesh.centroids is not None
+    assert mesh.centroid_uvs is not None
+    assert whole.uvs is not None
     assert mesh.normals is not None
     assert mesh.uvs is not None
     assert mesh.tangents is not None
     assert len(mesh.positions) == 3 * len(mesh.triangles)
-    for array in (mesh.centroids, mesh.normals, mesh.uvs, mesh.tangents):
+    for array in (mesh.centroids, mesh.normals, mesh.centroid_uvs, mesh.tangents):
         np.testing.assert_array_equal(np.ptp(array[mesh.triangles], axis=1), 0)
     corners = mesh.positions[mesh.triangles].astype(float)
     np.testing.assert_allclose(mesh.centroids[::3], corners.mean(axis=1), atol=1e-7)
     np.testing.assert_allclose(mesh.normals[::3], face_normals(mesh), atol=1e-7)
+    # The corners keep their own uvs: a cut-out follows its texture within the triangle.
+    np.testing.assert_array_equal(mesh.uvs[mesh.triangles], whole.uvs[whole.triangles])
+    np.testing.assert_allclose(mesh.centroid_uvs[::3], whole.uvs[whole.triangles].mean(axis=1), atol=1e-7)
     np.testing.assert_allclose(np.einsum("ij,ij->i", mesh.tangents[:, :3], mesh.normals), 0, atol=1e-6)
 
 

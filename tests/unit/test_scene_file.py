@@ -278,7 +278,6 @@ class TestSchema:
         with pytest.raises(ValueError, match="validation error"):
             Scene.model_validate(table)
 
-    @pytest.mark.xfail(strict=True, reason="the bounds of Parameter are checked by a validator that the schema does not know")
     @pytest.mark.parametrize(("name", "value"), [("kd", -1), ("exponent", 2e8), ("exponent", -math.pi)])
     def test_knows_the_range_of_parameters(self, name: str, value: float, validator: Any) -> None:
         table = {**TABLE, "materials": {"red": {"brdf": "phong", name: value}}}

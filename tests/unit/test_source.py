@@ -220,7 +220,7 @@ def declared(stage: str, kind: str) -> set[str]:
     return set(re.findall(rf"^{kind} \w+ (\w+)(?:\[\d+\])?;", stage, re.M))
 
 
-@settings(max_examples=700)
+@settings(max_examples=60)
 @given(scene=scenes())
 def test_what_is_declared_is_used(scene: Any, renderer: Renderer, tmp_path_factory: pytest.TempPathFactory) -> None:
     """A uniform or an attribute that the driver drops was not needed: the plan has let it slip through."""

@@ -180,9 +180,7 @@ class TestAlpha:
         Image(pixels).save(tmp_path / "half.png")
         return tmp_path / "half.png"
 
-    FLAT = pytest.mark.xfail(strict=True, reason="a faceted mesh has one texture coordinate a triangle, and so one alpha")
-
-    @pytest.mark.parametrize("rate", [pytest.param("flat", marks=FLAT), "gouraud", "phong"])
+    @pytest.mark.parametrize("rate", ["flat", "gouraud", "phong"])
     def test_a_cut_out(self, rate: str, draw: Any, half: Path) -> None:
         behind = {**square(z=-1, brdf="ambient", ka=[0, 0, 1])}
         for objects in (
