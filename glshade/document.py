@@ -83,7 +83,8 @@ def _speak(error: Any, fields: Iterable[str]) -> str:
 class Document(BaseModel):
     """A table of the scene file: unknown keys are faults, values are frozen, numbers are finite."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True)
+    # A validator is built when its model is first met: a scene meets few of them, and start-up time is a feature.
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True, defer_build=True)
 
     @field_validator("*", mode="before")
     @classmethod

@@ -141,7 +141,7 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
     material = instance.material
     model = BRDFS[material.brdf]
     # A model that answers only to ambient light never asks for another.
-    if all(declared.lobe == "ambient" for declared in model.parameters().values()):
+    if not model.asked_for("light"):
         kinds.clear()
     groups = []
     for (name, falloff), count in sorted(kinds.items()):
@@ -153,11 +153,13 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
     # Where no texture takes part, ambient light adds one colour, which is worked out beforehand.
     varies = instance.vertex_colours or any(isinstance(getattr(material, name), Texture) for name in model.parameters())
     how: Literal["none", "constant", "varying"] = "none" if not ambient else "varying" if varies else "constant"
+    asked = model.asked_for("light") if groups else frozenset()
+    asked |= model.asked_for("ambient") if how == "varying" else frozenset()
+    asked |= {model.parameters()[name].same_as or name for name in asked if getattr(material, name) is None}
     parameters = []
     for name, declared in model.parameters().items():
         value = getattr(material, name)
-        used = how == "varying" or (groups and declared.lobe == "all")
-        if not used:
+        if name not in asked:
             use: str = "unused"
         elif value is None and declared.same_as is not None:
             use = declared.same_as

@@ -112,7 +112,7 @@ class Object(Document):
     name: str | None = Field(None, description="for light linking, parents and messages")
     mesh: Annotated[MeshSource, BeforeValidator(_mesh)] | None = Field(None, description="mesh file: OBJ, PLY, STL, glTF")
     shape: Annotated[Shape, Chosen(SHAPES, "type", shorthand=True)] | None = Field(None, description="or a primitive")
-    transform: Transform = Transform()
+    transform: Transform = Field(default_factory=Transform)
     parent: str | None = Field(None, description="name of the object whose transform comes after this one's")
     material: (
         Annotated[Annotated[str, Tag("shorthand")] | Annotated[Material, Tag("table")], Discriminator(_material_branch)] | None
@@ -146,7 +146,7 @@ class Film(Document):
     samples: Literal[1, 2, 4, 8] = Field(1, description="samples a pixel for smooth edges, resolved in linear light")
     background: Annotated[tuple[Finite, ...], AfterValidator(_colour_with_alpha)] = Field(
         (0.0, 0.0, 0.0),
-        description="linear Rec. 709; with a fourth number, alpha, the picture has alpha too (premultiplied)",
+        description="linear Rec. 709; with a fourth number, straight alpha, the picture has alpha too",
     )
     encoding: Literal["srgb", "linear"] = Field("srgb", description="of 8-bit pictures; EXR is always linear")
     exposure: Annotated[float, Field(ge=-64, le=64)] = Field(0.0, description="doubles all light [stops]")
@@ -165,8 +165,8 @@ class Scene(Document):
     """The whole: what is drawn, what it is made of, what lights it, who looks, and on what it is recorded."""
 
     description: str = Field("", description="what there is to see")
-    film: Film = Film()
-    camera: Annotated[Camera, Chosen(CAMERAS, "type", default="perspective")] = Perspective()
+    film: Film = Field(default_factory=Film)
+    camera: Annotated[Camera, Chosen(CAMERAS, "type", default="perspective")] = Field(default_factory=Perspective)
     materials: dict[str, Material] = Field({}, description="name -> material")
     objects: tuple[Object, ...] = Field(description="what is drawn")
     lights: tuple[Annotated[Light, Chosen(LIGHTS, "type")], ...] | None = Field(

@@ -7,6 +7,7 @@ float64: f cos = BRDF times max(n.l, 0) [1/sr], 0 where n.l <= 0 or n.v <= 0.
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -36,8 +37,7 @@ class Parameter:
     """What a model declares of one parameter.
 
     `low`, `high` bound it; `usual` is the range worth a slider; `same_as` names the parameter it equals when left out;
-    `lobe` is "ambient" where only ambient light asks for it; `base` marks the surface's own colour, which vertex colours
-    multiply and whose texture carries alpha.
+    `base` marks the surface's own colour, which vertex colours multiply and whose texture carries alpha.
     """
 
     description: str
@@ -46,7 +46,6 @@ class Parameter:
     usual: tuple[float, float] = (0.0, 1.0)
     unit: str = "1"
     same_as: str | None = None
-    lobe: Literal["all", "ambient"] = "all"
     base: bool = False
 
 
@@ -84,6 +83,18 @@ class Brdf(Document):
             if isinstance(extra, dict) and "glshade" in extra:
                 found[name] = Parameter(**extra["glshade"])  # type: ignore[arg-type]
         return found
+
+    @classmethod
+    @cache
+    def asked_for(cls, by: Literal["light", "ambient"]) -> frozenset[str]:
+        """The parameters that light from a direction, or ambient light, asks for: seen by running the model once."""
+        asked = _Asked(cls)
+        up = np.array([[0.0, 0.0, 1.0]])
+        if by == "light":
+            cls.brdf_cos(asked, up, up)
+        else:
+            cls.ambient_reflectance(asked)
+        return frozenset(asked.names)
 
     @classmethod
     def is_colour(cls, name: str) -> bool:
@@ -132,6 +143,18 @@ class Brdf(Document):
     def ambient_reflectance(m: Any) -> Array:
         """(..., 3): what the model reflects of ambient light."""
         raise NotImplementedError
+
+
+class _Asked:
+    """Stands for a material, and notes which parameters are looked at."""
+
+    def __init__(self, model: type[Brdf]) -> None:
+        self.names: set[str] = set()
+        self._model = model
+
+    def __getattr__(self, name: str) -> Array:
+        self.names.add(name)
+        return np.full((1, 3) if self._model.is_colour(name) else (1,), 0.5)
 
 
 def _bound(schema: dict[str, Any], declared: Parameter) -> None:

@@ -13,11 +13,11 @@ class Ambient(Brdf):
     source: ClassVar[str] = "lecture slides 12, 23"
 
     brdf: Literal["ambient"] = "ambient"
-    ka: Colour = parameter((0.8, 0.8, 0.8), Parameter("ambient reflectance", lobe="ambient", base=True))
+    ka: Colour = parameter((0.8, 0.8, 0.8), Parameter("ambient reflectance", base=True))
 
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
-        return np.zeros(np.broadcast_shapes(np.shape(m.ka), l.shape, v.shape))
+        return np.zeros(np.broadcast_shapes(l.shape, v.shape))
 
     @staticmethod
     def ambient_reflectance(m: Any) -> Array:

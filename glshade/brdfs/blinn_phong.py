@@ -21,7 +21,7 @@ class BlinnPhong(Brdf):
     kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance", base=True))
     ks: Colour = parameter((0.2, 0.2, 0.2), Parameter("specular strength at the lobe's centre"))
     exponent: Scalar = parameter(128.0, Parameter("narrowness of the lobe, p", high=1e8, usual=(1.0, 1000.0)))
-    ka: Colour | None = parameter(None, Parameter("ambient reflectance; left out: kd", same_as="kd", lobe="ambient"))
+    ka: Colour | None = parameter(None, Parameter("ambient reflectance; left out: kd", same_as="kd"))
 
     def canonical(self, ambient: bool) -> Brdf:
         return without_lobe(self, ambient)

@@ -119,7 +119,7 @@ def open_context(backend: Backend = "auto", device: int | None = None) -> Contex
     try:
         gl = moderngl.create_context(standalone=True, require=REQUIRED_VERSION)
     except Exception as error:
-        raise ContextError(f"no OpenGL {REQUIRED_VERSION / 100:.1f} context: {error}; {ADVICE}") from None
+        raise ContextError(f"no OpenGL {REQUIRED_VERSION / 100:.1f} context from the window system: {error}") from None
     return Context(gl, "standalone", lambda name: None)
 
 

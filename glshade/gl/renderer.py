@@ -377,8 +377,8 @@ def _paged(plan: ProgramPlan) -> list[Any]:
 def _without_ambient(plan: ProgramPlan) -> tuple[tuple[str, str], ...]:
     from glshade.brdfs import BRDFS
 
-    declared = BRDFS[plan.brdf].parameters()
-    return tuple((name, "unused" if declared[name].lobe == "ambient" else use) for name, use in plan.parameters)
+    lit = BRDFS[plan.brdf].asked_for("light")
+    return tuple((name, use if name in lit else "unused") for name, use in plan.parameters)
 
 
 def _middle(instance: Instance) -> NDArray[np.float64]:
@@ -395,8 +395,9 @@ def _back_to_front(instance: Instance, assembly: Assembly) -> NDArray[np.intp]:
 def _sample_passes(samples: int, available: int) -> list[tuple[float, float]]:
     """Offsets [pixels] of the pictures that make up the samples: one, or several where the driver has too few of its own."""
     count = max(1, -(-samples // max(available, 1)))
-    # Along a diagonal that a rotated grid of four does not have, about the pixel's middle.
-    return [((i + 0.5) / count - 0.5, ((i + 0.5) / count - 0.5) / 2) if count > 1 else (0.0, 0.0) for i in range(count)]
+    # Together with a driver's rotated grid of `available`, no two samples share a row or a column.
+    share = 1 / (count * max(available, 1))
+    return [((i - (count - 1) / 2) * share, (3 * i % count - (count - 1) / 2) * share) for i in range(count)]
 
 
 def _background(colour: tuple[float, ...], encoding: Literal["linear", "srgb"]) -> tuple[float, float, float, float]:

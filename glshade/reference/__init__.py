@@ -11,17 +11,24 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.image import Image
+from glshade.reference.bounds import LLVMPIPE, Bounds, Driver, alphas, bounds, depth_slack, sealed
 from glshade.reference.inputs import Draw, Inputs, prepare
 from glshade.reference.raster import MARGIN, Fragments, rasterise, resolve
 from glshade.reference.shade import AT_CENTRE, Sampling, is_there, opacity, shade
 from glshade.scene import Rate, Scene
 
 __all__ = [
+    "LLVMPIPE",
     "MARGIN",
+    "Bounds",
     "Draw",
+    "Driver",
     "Fragments",
     "Inputs",
     "Sampling",
+    "alphas",
+    "bounds",
+    "depth_slack",
     "is_there",
     "opacity",
     "prepare",
@@ -29,6 +36,7 @@ __all__ = [
     "rasterise",
     "render",
     "resolve",
+    "sealed",
     "shade",
 ]
 

@@ -206,7 +206,7 @@ def alpha_of(draw: Draw, surface: Surface) -> Array:
     return value
 
 
-def _material(draw: Draw, surface: Surface) -> SimpleNamespace:
+def material_of(draw: Draw, surface: Surface) -> SimpleNamespace:
     """The model's parameters at the points: colours (N, 3) or (3,), scalars (N,) or ()."""
     found: dict[str, Array] = {}
     for name, declared in draw.model.parameters().items():
@@ -253,10 +253,10 @@ def toward_viewer(draw: Draw, position: Array) -> Array:
     return np.broadcast_to(draw.viewer.astype(position.dtype), position.shape)
 
 
-def shown(draw: Draw, surface: Surface) -> Array:
-    """(N, 3): the sum over the lights of what the points show to the viewer."""
+def shown(draw: Draw, surface: Surface, material: SimpleNamespace | None = None) -> Array:
+    """(N, 3): the sum over the lights of what the points show to the viewer. material: as `material_of` gives it, if at hand."""
     dtype = surface.position.dtype
-    m = _material(draw, surface)
+    m = material or material_of(draw, surface)
     total = np.zeros((len(surface.position), 3), dtype=dtype)
     if draw.ambient.any():
         total += draw.ambient.astype(dtype) * draw.model.ambient_reflectance(m)

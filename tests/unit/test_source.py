@@ -235,9 +235,6 @@ def test_what_is_declared_is_used(scene: Any, renderer: Renderer, tmp_path_facto
         nothing_unused(plan, renderer)
 
 
-@pytest.mark.xfail(
-    strict=True, reason="plan_instance takes all of a model's parameters for used where ambient light meets a texture"
-)
 @pytest.mark.parametrize("brdf", ["phong", "ashikhmin_shirley"])
 def test_ambient_light_asks_for_no_lobe(brdf: str, renderer: Renderer, tmp_path: Path) -> None:
     Image(np.full((2, 2, 3), 0.5, dtype=np.float32)).save(tmp_path / "t.png")
