@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade import Renderer, Scene, reference
+from glshade import Mesh, Renderer, Scene, reference
 from glshade.reference import Fragments, Sampling
 from glshade.scene import Rate
 
@@ -28,6 +28,17 @@ Array = NDArray[np.float64]
 BEHIND = 1e-4
 STEP = 1 / 256
 ARITHMETIC = 2e-5
+
+
+SUN: dict[str, Any] = {"type": "directional", "direction": (-0.4, -0.6, -0.7), "colour": (1.0, 0.9, 0.8)}
+CAMERA: dict[str, Any] = {"eye": (0.4, 0.9, 5.2), "target": (0.0, 0.0, 0.0), "fov": 30}
+BALL: dict[str, Any] = {"shape": {"type": "icosphere", "subdivisions": 3}}
+# One model that does not look at tangents, and one that does.
+MATERIALS: dict[str, dict[str, Any]] = {
+    "phong": {"brdf": "phong", "kd": (0.7, 0.5, 0.3), "ks": 0.4, "exponent": 50.0},
+    "ashikhmin_shirley": {"brdf": "ashikhmin_shirley", "kd": (0.4, 0.5, 0.3), "ks": 0.2, "pu": 20.0, "pv": 200.0},
+}
+RATES: tuple[Rate, ...] = ("phong", "gouraud", "flat")
 
 
 @dataclass(frozen=True)
@@ -41,11 +52,14 @@ class Explained:
     of_bound: float
 
 
-def explain(scene: Scene, renderer: Renderer, shading: Rate | None = None, tile: int | None = None) -> Explained:
-    """Draws the scene, on a background with alpha, and compares. AssertionError for what is not finite or not explained."""
+def explain(scene: Scene, renderer: Renderer, shading: Rate | None = None, slack: float = 0.0) -> Explained:
+    """Draws the scene, on a background with alpha, and compares. AssertionError for what is not finite or not explained.
+
+    slack: added to the bound, relative to max(1, |c|), where the scene's own conditioning is known.
+    """
     film = scene.film.model_copy(update={"background": (0.0, 0.0, 0.0, 0.0)})
     scene = scene.model_copy(update={"film": film})
-    gpu = renderer.render(scene, dtype="float32", shading=shading, tile=tile).pixels.copy()
+    gpu = renderer.render(scene, dtype="float32", shading=shading).pixels.copy()
     height, width = gpu.shape[:2]
     assert np.isfinite(gpu).all(), f"{(~np.isfinite(gpu)).any(axis=2).sum()} pixels are not finite"
     inputs = reference.prepare(scene, shading)
@@ -65,7 +79,7 @@ def explain(scene: Scene, renderer: Renderer, shading: Rate | None = None, tile:
     value = reference.shade(inputs, found)
     with np.errstate(all="ignore"):
         single = reference.shade(inputs, found, Sampling(dtype=np.float32))
-    bound = ARITHMETIC * np.maximum(1, np.abs(value))
+    bound = (ARITHMETIC + slack) * np.maximum(1, np.abs(value))
     bound += 4 * np.where(np.isfinite(single), np.abs(single - value), 0)
     sides = [reference.shade(inputs, found, Sampling(offset=o)) for o in ((STEP, 0), (-STEP, 0), (0, STEP), (0, -STEP))]
     bound += np.max([np.abs(side - value) for side in sides], axis=0)
@@ -90,3 +104,16 @@ def scene(objects: Any, lights: Any, size: tuple[int, int] = (48, 48), **more: A
     """A scene in a few words."""
     objects = [objects] if isinstance(objects, dict) else objects
     return Scene.model_validate({"objects": objects, "lights": lights, "film": {"size": size}, **more})
+
+
+def triangles(corners: Any, material: Any) -> dict[str, Any]:
+    """An object of triangles with corners (3 T, 3) of their own, seen from both sides."""
+    corners = np.asarray(corners, dtype=np.float64).reshape(-1, 3)
+    mesh = Mesh.build(corners, np.arange(len(corners)).reshape(-1, 3))
+    return {"mesh": mesh, "material": material, "sides": "both"}
+
+
+def everywhere(make: Any, renderer: Renderer, slack: float = 0.0, rates: tuple[Rate, ...] = RATES) -> tuple[int, float]:
+    """(pixels drawn at least, worst): make(material) as a scene of both materials, at all rates, explained."""
+    found = [explain(make(material), renderer, rate, slack) for material in MATERIALS.values() for rate in rates]
+    return min(one.drawn for one in found), float(np.fmax.reduce([one.worst for one in found]))

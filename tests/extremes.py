@@ -157,8 +157,11 @@ def joined(cases: dict[str, Pairs]) -> tuple[NDArray[np.float32], NDArray[np.flo
     return l, v, np.repeat(list(cases), [len(pair[0]) for pair in cases.values()])
 
 
-def exact(material: Brdf, l: Any, v: Any) -> tuple[Array, Array]:
-    """(value, conditioning), each (N, 3): the float64 value at float32 inputs, and how far rounding those may move it."""
+def exact(material: Brdf, l: Any, v: Any, tilt: float = TILT) -> tuple[Array, Array]:
+    """(value, conditioning), each (N, 3): the float64 value at float32 inputs, and how far rounding those may move it.
+
+    tilt: of the normal [rad]; 0 where that is taken to be +z exactly.
+    """
     parameters = {name: rounded(x).astype(np.float64) for name, x in parameter_values(material).items()}
 
     def f(l: Array, v: Array, given: dict[str, Array]) -> Array:
@@ -176,7 +179,7 @@ def exact(material: Brdf, l: Any, v: Any) -> tuple[Array, Array]:
             moved = moved + np.max(np.abs(np.stack(both) - value), axis=0)
     # A normal that is tilted is a pair of directions that is turned: to the four sides, and between them.
     turned = []
-    for x, y in itertools.product((-TILT, 0.0, TILT), repeat=2):
+    for x, y in itertools.product((-tilt, 0.0, tilt) if tilt else (0.0,), repeat=2):
         pair = l.copy(), v.copy()
         for d, before in zip(pair, (l, v), strict=True):
             d[:, 0] -= x * before[:, 2]

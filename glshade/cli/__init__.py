@@ -30,6 +30,16 @@ class Commands(click.Group):
         assert isinstance(command, click.Command)
         return command
 
+    def invoke(self, ctx: click.Context) -> object:
+        try:
+            result: object = super().invoke(ctx)
+            sys.stdout.flush()
+            return result
+        except BrokenPipeError:
+            # Whoever read stdout has closed it (`| head`): nothing more to say, nor to flush at exit. click would exit with 1.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
+
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
         if args and not args[0].startswith("-") and args[0] not in COMMANDS:
             import difflib
@@ -51,7 +61,6 @@ def main() -> None:
     warnings.showwarning = lambda message, *_: click.echo(f"glshade: warning: {message}", err=True)
     try:
         code = cli.main(standalone_mode=False)
-        sys.stdout.flush()
     except GlshadeError as error:
         for line in str(error).splitlines():
             click.echo(f"glshade: {line}", err=True)
@@ -62,10 +71,6 @@ def main() -> None:
     except (click.Abort, KeyboardInterrupt):
         click.echo("glshade: interrupted", err=True)
         code = INTERRUPTED
-    except BrokenPipeError:
-        # Whoever read stdout has closed it (`| head`): nothing more to say, nor to flush at exit.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 0
     except (OSError, MemoryError) as error:
         click.echo(f"glshade: {error}", err=True)
         code = 1

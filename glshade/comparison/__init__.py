@@ -78,9 +78,17 @@ class Comparison:
 
     @property
     def ambiguous(self) -> float:
-        """The share of silhouettes, ties and masked pixels among all that is not background."""
-        covered = sum(number for kind, number in self.counts.items() if kind != PixelClass.BACKGROUND)
-        return sum(number for kind, number in self.counts.items() if kind.ambiguous) / max(covered, 1)
+        """The picture's share of silhouettes, ties and masked pixels."""
+        return self._ambiguous / max(sum(self.counts.values()), 1)
+
+    @property
+    def doubtful(self) -> float:
+        """The share of the same among all pixels that are not background."""
+        return self._ambiguous / max(sum(self.counts.values()) - self.counts[PixelClass.BACKGROUND], 1)
+
+    @property
+    def _ambiguous(self) -> int:
+        return sum(number for kind, number in self.counts.items() if kind.ambiguous)
 
 
 def classify(

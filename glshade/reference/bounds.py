@@ -31,6 +31,7 @@ from glshade.reference.shade import (
     surface_at,
     toward_viewer,
 )
+from glshade.reference.texturing import Sampler
 
 Array = NDArray[Any]
 
@@ -43,7 +44,7 @@ AGAIN = 4.0
 # ... and what it costs at least: 16 float32 steps of the value, or of the picture's brightest up to 1.
 STEPS = 16 * 2 * U
 # Where the level of detail is looked at, in shares of how far the driver's may be off.
-LEVELS = (-1.0, -0.5, 0.5, 1.0)
+LEVELS = (-1.0, -0.6, -0.3, -0.1, 0.1, 0.3, 0.6, 1.0)
 # An edge is near a pixel's centre within this [pixels]: the margin of coverage, and the steps that its corners are snapped by.
 NEAR = (MARGIN + 2) / SUBPIXELS
 # Slimmer (L^2 over twice the area) a triangle may turn over when its corners are snapped.
@@ -60,8 +61,8 @@ class Driver:
     """
 
     name: str = "llvmpipe"
-    plane: float = 4.0
-    window: float = 4.0
+    plane: float = 1.0
+    window: float = 1.0
     snap: float = 0.0
     level: float = 0.1
     texel: float = 0.0
@@ -302,7 +303,7 @@ def _errors(draw: Draw, fragments: Fragments, surface: Surface, planes: _Planes,
             found["tangent"] = planes.errors(corner.tangent[place][..., :3], UNIT)
     if corner.uv is not None and surface.footprint is not None:
         found["uv"] = planes.errors(corner.uv[place], 0.0)
-        samplers = [*draw.samplers.values(), *([draw.normal_map] if draw.normal_map else [])]
+        samplers = _samplers(draw)
         if driver.texel:
             largest = max(1 / min(s.widths[0], s.heights[0]) for s in samplers)
             found["uv"] = found["uv"] + driver.texel * largest
@@ -421,7 +422,7 @@ def _spread(draw: Draw, evaluate: Callable[..., Array], surface: Surface, errors
         reaches([evaluate(draw, replace(surface, colour=surface.colour + sign * errors.colour)) for sign in (-1, 1)])
     level = np.zeros_like(value)
     if errors.level:
-        there = [evaluate(draw, replace(surface, level=surface.level + share * errors.level)) for share in LEVELS]
+        there = [evaluate(draw, replace(surface, level=offset)) for offset in _levels(draw, surface, errors.level)]
         reaches(there)
         level = np.maximum.reduce([np.abs(other - value) for other in there])
     return {
@@ -439,8 +440,8 @@ def _alphas(draw: Draw, surface: Surface, errors: _Errors, driver: Driver) -> Ar
             uv = surface.uv.copy() if surface.uv is not None else errors.uv
             uv[:, axis] += sign * errors.uv[:, axis]
             there.append(alpha_of(draw, replace(surface, uv=uv)))
-        for share in LEVELS if errors.level else ():
-            there.append(alpha_of(draw, replace(surface, level=surface.level + share * errors.level)))
+        if errors.level:
+            there += [alpha_of(draw, replace(surface, level=offset)) for offset in _levels(draw, surface, errors.level)]
     slack: Array = 8 * U * np.abs(value)
     if errors.colour is not None and surface.colour is not None:
         there += [alpha_of(draw, replace(surface, colour=surface.colour + sign * errors.colour)) for sign in (-1, 1)]
@@ -448,6 +449,19 @@ def _alphas(draw: Draw, surface: Surface, errors: _Errors, driver: Driver) -> Ar
     low = value - sum(np.maximum(value - other, 0) for other in there) - slack
     high = value + sum(np.maximum(other - value, 0) for other in there) + slack
     return np.stack([value, low, high])
+
+
+def _levels(draw: Draw, surface: Surface, most: float) -> list[Any]:
+    """Offsets () or (N,) of the level of detail to look at: evenly, and where one mip level hands over to the next, since
+    between those a texture is linear in it."""
+    assert surface.footprint is not None
+    samplers = {s.widths[0]: s for s in _samplers(draw)}
+    levels = [sampler.level(*surface.footprint) for sampler in samplers.values()]
+    return [*(share * most for share in LEVELS), *(np.clip(np.rint(level) - level, -most, most) for level in levels)]
+
+
+def _samplers(draw: Draw) -> list[Sampler]:
+    return [*draw.samplers.values(), *([draw.normal_map] if draw.normal_map else [])]
 
 
 def _narrow(surface: Surface) -> Surface:

@@ -44,7 +44,8 @@ class Surface:
     """Points of a surface, in world space relative to the eye.
 
     position, normal (N, 3), tangent (N, 4), uv (N, 2), colour (N, 4). The normal as interpolated, of any length. side (N,): -1
-    turns the normal over. footprint: change of uv from pixel to pixel, across and down; None in the vertex stage.
+    turns the normal over. footprint: change of uv from pixel to pixel, across and down; None in the vertex stage. level: added
+    to the textures' level of detail, a number or (N,).
     """
 
     side: Array
@@ -54,7 +55,7 @@ class Surface:
     uv: Array | None
     colour: Array | None
     footprint: tuple[Array, Array] | None = None
-    level: float = 0.0
+    level: Any = 0.0
 
 
 def shade(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) -> Array:

@@ -1,0 +1,34 @@
+"""Law: a picture of one pixel, of one column and of three rows wider than any texture is drawn, and is the reference's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from explained import BALL, MATERIALS, RATES, SUN, explain, scene
+
+from glshade import Renderer
+
+# Wide enough a view that the sphere fills the short side and reaches along the long one.
+FILMS = {(1, 1): 20.0, (1, 16384): 175.0, (16385, 3): 1.0}
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("size", FILMS, ids=str)
+def test_explained(size: tuple[int, int], rate: str, renderer: Renderer) -> None:
+    camera = {"eye": (0.4, 0.9, 5.2), "target": (0.0, 0.0, 0.0), "fov": FILMS[size]}
+    for material in MATERIALS.values():
+        # Across a film 16385 wide a pixel's width is small beside its distance from the middle, from where float32 planes reckon.
+        found = explain(scene({**BALL, "material": material}, [SUN], size, camera=camera), renderer, rate)  # type: ignore[arg-type]
+        assert found.pixels.shape == (size[1], size[0], 4)
+        assert found.drawn == 1 if size == (1, 1) else found.drawn > 100
+        # Measured: 1.5e-4, where a triangle is thousands of pixels wide.
+        assert not found.worst > 5e-4
+
+
+@pytest.mark.parametrize("size", FILMS, ids=str)
+def test_eight_bits(size: tuple[int, int], renderer: Renderer) -> None:
+    camera = {"eye": (0.4, 0.9, 5.2), "target": (0.0, 0.0, 0.0), "fov": FILMS[size]}
+    pixels = renderer.render(scene(BALL, [SUN], size, camera=camera)).pixels
+    assert pixels.shape == (size[1], size[0], 3)
+    assert pixels.dtype == np.uint8
+    assert pixels.max() > 50
