@@ -1,6 +1,6 @@
 """Whether a picture is what the float64 reference says: for tests of extreme scenes, where most pixels may be rims.
 
-At each pixel the reference lists every fragment that a driver might draw there (coverage is decided within 3/256 pixel of an edge
+At each pixel the reference lists every fragment that a driver might draw there (within 3/256 pixel of an edge, coverage may go
 either way). The pixel is explained where one that nothing certain hides has its value, within
 
     2e-5 max(1, |c|)                                 the model's own arithmetic, and normals interpolated to nearly nothing

@@ -41,7 +41,7 @@ WIDE = 1e3
 
 
 def walk(declared: Parameter) -> list[float]:
-    """Where a scalar is tried: its bounds, the ends of its usual range, 1e-4, 1e-3 and 1, and the decades up to 1e8 of an exponent."""
+    """Where a scalar is tried: its bounds, the ends of its usual range, 1e-4, 1e-3, 1, and an exponent's decades up to 1e8."""
     high = STRONG if declared.high is None else declared.high
     found = {declared.low, high, *declared.usual, 1e-4, 1e-3, 1.0}
     if high >= WIDE:
@@ -50,8 +50,8 @@ def walk(declared: Parameter) -> list[float]:
 
 
 def at_extremes(name: str, most: int) -> list[Brdf]:
-    """The model with each of its scalars at all places of the walk in turn, then by chance (but always the same) with all of them
-    anywhere on it, `most` in all; and its colours at their ends."""
+    """The model with each of its scalars at all places of the walk in turn, then by chance (but always the same) with all of
+    them anywhere on it, `most` in all; and its colours at their ends."""
     model, random = BRDFS[name], np.random.default_rng(1)
     declared = model.parameters()
     scalars = {key: walk(d) for key, d in declared.items() if not model.is_colour(key)}

@@ -44,7 +44,7 @@ AGAIN = 4.0
 # ... and what it costs at least: 16 float32 steps of the value, or of the picture's brightest up to 1.
 STEPS = 16 * 2 * U
 # Where the level of detail is looked at, in shares of how far the driver's may be off.
-LEVELS = (-1.0, -0.6, -0.3, -0.1, 0.1, 0.3, 0.6, 1.0)
+LEVELS = (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
 # An edge is near a pixel's centre within this [pixels]: the margin of coverage, and the steps that its corners are snapped by.
 NEAR = (MARGIN + 2) / SUBPIXELS
 # Slimmer (L^2 over twice the area) a triangle may turn over when its corners are snapped.
@@ -61,8 +61,8 @@ class Driver:
     """
 
     name: str = "llvmpipe"
-    plane: float = 1.0
-    window: float = 1.0
+    plane: float = 2.0
+    window: float = 2.0
     snap: float = 0.0
     level: float = 0.1
     texel: float = 0.0
@@ -422,9 +422,10 @@ def _spread(draw: Draw, evaluate: Callable[..., Array], surface: Surface, errors
         reaches([evaluate(draw, replace(surface, colour=surface.colour + sign * errors.colour)) for sign in (-1, 1)])
     level = np.zeros_like(value)
     if errors.level:
-        there = [evaluate(draw, replace(surface, level=offset)) for offset in _levels(draw, surface, errors.level)]
-        reaches(there)
-        level = np.maximum.reduce([np.abs(other - value) for other in there])
+        there = [evaluate(draw, replace(surface, level=share * errors.level)) if share else value for share in LEVELS]
+        margin = _between(there)
+        reaches([*(other - margin for other in there), *(other + margin for other in there)])
+        level = np.maximum.reduce([np.abs(other - value) for other in there]) + margin
     return {
         **{"value": value, "below": below, "above": above, "level": level},
         **{"rounding": rounding, "magnitude": np.abs(value)},
@@ -441,23 +442,23 @@ def _alphas(draw: Draw, surface: Surface, errors: _Errors, driver: Driver) -> Ar
             uv[:, axis] += sign * errors.uv[:, axis]
             there.append(alpha_of(draw, replace(surface, uv=uv)))
         if errors.level:
-            there += [alpha_of(draw, replace(surface, level=offset)) for offset in _levels(draw, surface, errors.level)]
+            several = [alpha_of(draw, replace(surface, level=share * errors.level)) for share in LEVELS]
+            margin = _between(several)
+            there += [np.minimum.reduce(several) - margin, np.maximum.reduce(several) + margin]
     slack: Array = 8 * U * np.abs(value)
     if errors.colour is not None and surface.colour is not None:
         there += [alpha_of(draw, replace(surface, colour=surface.colour + sign * errors.colour)) for sign in (-1, 1)]
-    # Each of uv's two axes, the level and the colour by itself, and their sum.
     low = value - sum(np.maximum(value - other, 0) for other in there) - slack
     high = value + sum(np.maximum(other - value, 0) for other in there) + slack
     return np.stack([value, low, high])
 
 
-def _levels(draw: Draw, surface: Surface, most: float) -> list[Any]:
-    """Offsets () or (N,) of the level of detail to look at: evenly, and where one mip level hands over to the next, since
-    between those a texture is linear in it."""
-    assert surface.footprint is not None
-    samplers = {s.widths[0]: s for s in _samplers(draw)}
-    levels = [sampler.level(*surface.footprint) for sampler in samplers.values()]
-    return [*(share * most for share in LEVELS), *(np.clip(np.rint(level) - level, -most, most) for level in levels)]
+def _between(samples: list[Array]) -> Array:
+    """How far a function may reach past the largest of its evenly spaced samples: a quarter of its bend, which is what a
+    kink halfway between two of them (one mip level handing over to the next) makes; a parabola makes half of that."""
+    s = np.stack(samples)
+    bend: Array = np.abs(s[2:] - 2 * s[1:-1] + s[:-2]).max(axis=0)
+    return bend / 4
 
 
 def _samplers(draw: Draw) -> list[Sampler]:

@@ -17,7 +17,6 @@ FILMS = {(1, 1): 20.0, (1, 16384): 175.0, (16385, 3): 1.0}
 def test_explained(size: tuple[int, int], rate: str, renderer: Renderer) -> None:
     camera = {"eye": (0.4, 0.9, 5.2), "target": (0.0, 0.0, 0.0), "fov": FILMS[size]}
     for material in MATERIALS.values():
-        # Across a film 16385 wide a pixel's width is small beside its distance from the middle, from where float32 planes reckon.
         found = explain(scene({**BALL, "material": material}, [SUN], size, camera=camera), renderer, rate)  # type: ignore[arg-type]
         assert found.pixels.shape == (size[1], size[0], 4)
         assert found.drawn == 1 if size == (1, 1) else found.drawn > 100

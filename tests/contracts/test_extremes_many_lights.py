@@ -1,6 +1,6 @@
 """Law: the light of many lamps is the sum of each, whether the program counts them, loops over a page, or adds up many pages.
 
-llvmpipe stops loops of more than 65,535 rounds in one invocation without a word; the renderer never asks for more than a page's.
+llvmpipe stops loops of more than 65,535 rounds in one invocation without a word; the renderer asks for no more than a page.
 """
 
 from __future__ import annotations

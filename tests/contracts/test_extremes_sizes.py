@@ -1,4 +1,4 @@
-"""Law: objects of any size, as far from the origin as may be, and scaled, flattened and mirrored, look as the reference says."""
+"""Law: objects of any size, far from the origin, and scaled, flattened and mirrored, look as the reference says."""
 
 from __future__ import annotations
 
