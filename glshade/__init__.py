@@ -8,9 +8,12 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from glshade import reference as reference
     from glshade.brdfs import BRDFS as BRDFS
     from glshade.camera import Orthographic as Orthographic
     from glshade.camera import Perspective as Perspective
+    from glshade.comparison import Difference as Difference
+    from glshade.comparison import compare as compare
     from glshade.errors import AssetError as AssetError
     from glshade.errors import ContextError as ContextError
     from glshade.errors import GlshadeError as GlshadeError
@@ -31,12 +34,15 @@ if TYPE_CHECKING:
     from glshade.scene_file import load as load
     from glshade.texture import NormalMap as NormalMap
     from glshade.texture import Texture as Texture
+    from glshade.verifier import Verdict as Verdict
+    from glshade.verifier import verify as verify
 
-# The public surface, and where each name lives. Loaded when asked for: `import glshade` costs nothing.
+# The public surface, and where each name lives (a module: ""). Loaded when asked for: `import glshade` costs nothing.
 _HOME = {
     "AssetError": "errors",
     "BRDFS": "brdfs",
     "ContextError": "errors",
+    "Difference": "comparison",
     "Film": "scene",
     "GlshadeError": "errors",
     "Image": "image",
@@ -53,10 +59,14 @@ _HOME = {
     "ShaderError": "errors",
     "Texture": "texture",
     "Transform": "scene",
+    "Verdict": "verifier",
+    "compare": "comparison",
     "evaluate": "gl.evaluate",
     "explain": "plan",
     "load": "scene_file",
+    "reference": "",
     "render": "gl.renderer",
+    "verify": "verifier",
 }
 __all__ = [*_HOME, "__version__"]
 
@@ -64,6 +74,8 @@ __all__ = [*_HOME, "__version__"]
 def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'glshade' has no attribute {name!r}")
+    if not _HOME[name]:
+        return importlib.import_module(f"glshade.{name}")
     return getattr(importlib.import_module(f"glshade.{_HOME[name]}"), name)
 
 

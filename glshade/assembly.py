@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,7 +49,7 @@ class Instance:
     vertex_colours: bool
     lights: tuple[int, ...]
 
-    @property
+    @cached_property
     def mirrored(self) -> bool:
         """Whether the transform turns counter-clockwise into clockwise."""
         return bool(np.linalg.det(self.world_from_object[:3, :3]) < 0)
@@ -70,9 +71,10 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
     """
     problems: list[str] = []
     pieces: list[tuple[Object, str, Mesh, Array, Brdf]] = []
+    by_name = {item.name: item for item in scene.objects}
     for index, item in enumerate(scene.objects):
         try:
-            pieces.extend(_pieces(scene, item, item.name or f"objects[{index}]"))
+            pieces.extend(_pieces(scene, by_name, item, item.name or f"objects[{index}]"))
         except SceneError as error:
             problems.extend(f"objects[{index}].mesh: {problem}" for problem in error.problems)
     if problems:
@@ -122,9 +124,11 @@ def rig(view: View) -> tuple[Light, ...]:
     )
 
 
-def _pieces(scene: Scene, item: Object, name: str) -> Iterator[tuple[Object, str, Mesh, Array, Brdf]]:
+def _pieces(
+    scene: Scene, by_name: dict[str | None, Object], item: Object, name: str
+) -> Iterator[tuple[Object, str, Mesh, Array, Brdf]]:
     """(object, name, mesh, world_from_object, material): one for each part of its mesh file."""
-    world = _world(scene, item)
+    world = _world(by_name, item)
     own = scene.materials[item.material] if isinstance(item.material, str) else item.material
     if item.shape is not None:
         yield item, name, item.shape.mesh(), world, own or DEFAULT_MATERIAL
@@ -153,8 +157,7 @@ def _file_material(part: mesh_file.Part, path: Path) -> Brdf:
 DEFAULT_MATERIAL: Brdf = BRDFS["phong"].model_validate({"kd": 0.6, "ks": 0.25, "exponent": 50.0})
 
 
-def _world(scene: Scene, item: Object) -> Array:
-    by_name = {other.name: other for other in scene.objects if other.name} if item.parent else {}
+def _world(by_name: dict[str | None, Object], item: Object) -> Array:
     world = item.transform.array()
     while item.parent is not None:
         item = by_name[item.parent]
@@ -193,9 +196,21 @@ def _needs_uvs(mesh: Mesh, material: Brdf) -> Iterator[str]:
                 yield f"its material's {name} is a texture, but its mesh has no texture coordinates"
 
 
-@lru_cache(maxsize=4096)
-def _ready(mesh: Mesh, flat: bool, normals: Normals, threshold: float, tangents: bool) -> Mesh:
-    """The mesh with the attributes that its instance needs; the same object for the same wishes."""
+# What was made of a mesh goes with it: a mesh that is new in every frame leaves nothing behind.
+_made: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Mesh | None]] = WeakKeyDictionary()
+
+
+def _ready(mesh: Mesh, *wishes: Any) -> Mesh:
+    """The mesh with the attributes that its instance needs; the same object for the same wishes (`_make`)."""
+    made = _made.setdefault(mesh, {})
+    if wishes not in made:
+        ready = _make(mesh, *wishes)
+        # None stands for the mesh itself, which would else keep itself alive.
+        made[wishes] = None if ready is mesh else ready
+    return made[wishes] or mesh
+
+
+def _make(mesh: Mesh, flat: bool, normals: Normals, threshold: float, tangents: bool) -> Mesh:
     ready = mesh if flat and not tangents else with_normals(mesh, normals, threshold)
     if tangents:
         ready = with_tangents(ready)

@@ -20,7 +20,7 @@ MARGIN = 1.08
 # From where a scene is seen when nobody says: from the front, a little to the right and above.
 THREE_QUARTERS = (0.55, 0.4, 1.0)
 # The near plane keeps at least this share of the far plane's distance: with reversed float depth that costs no precision.
-NEAREST_SHARE = 1e-4
+NEAREST_SHARE = 1e-7
 
 
 def affine(matrix: Matrix4) -> Matrix4:
@@ -126,7 +126,7 @@ class Camera(Document):
         if isinstance(near, number) and near <= 0 and data.get("type", "perspective") == "perspective":
             yield ("near",), f"must be greater than 0 in a perspective view, not {near:g}"
         eye, target = data.get("eye"), data.get("target")
-        if eye is not None and eye == target:
+        if eye is not None and target is not None and list(eye) == list(target):
             yield ("target",), "is where the eye is: there is no direction of view"
 
     def axes(self, middle: Array) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,9 @@ WORTHWHILE = 4096
 EDGE_ON = 0.02
 
 
-@lru_cache(maxsize=256)
+_cones_of: WeakKeyDictionary[Mesh, tuple[Array, Array, Array, Array]] = WeakKeyDictionary()
+
+
 def _cones(mesh: Mesh) -> tuple[Array, Array, Array, Array]:
     """(axis (K, 3), sine (K,), middle (K, 3), radius (K,)) of each full cluster, in the mesh's own space.
 
@@ -47,12 +49,14 @@ def _cones(mesh: Mesh) -> tuple[Array, Array, Array, Array]:
 def facing(instance: Instance, view: View) -> NDArray[np.intp] | None:
     """The triangles, without the clusters that show the viewer nothing but their backs; None: all of them.
 
-    Shirmun and Abi-Ezzi 1993's cone test, in the mesh's own space, where every affine transform keeps sides.
+    Shirman and Abi-Ezzi 1993's cone test, in the mesh's own space, where every affine transform keeps sides.
     """
     mesh = instance.mesh
     if instance.back_faces or len(mesh.triangles) < WORTHWHILE:
         return None
-    axis, sine, middle, radius = _cones(mesh)
+    if mesh not in _cones_of:
+        _cones_of[mesh] = _cones(mesh)
+    axis, sine, middle, radius = _cones_of[mesh]
     linear, translation = instance.world_from_object[:3, :3], instance.world_from_object[:3, 3]
     if view.perspective:
         away = middle - np.linalg.solve(linear, view.eye - translation)

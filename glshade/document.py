@@ -26,7 +26,7 @@ from pydantic import (
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
 # Internal union branches that pydantic puts in the path of an error; the author of a scene never wrote them.
-BRANCHES = frozenset({"value", "texture-table", "one", "pair", "shorthand", "table"})
+BRANCHES = frozenset({"<value>", "<texture-table>", "<shorthand>", "<table>"})
 
 
 # What pydantic calls "a valid dictionary or instance of Film", in the words of a scene file.

@@ -170,6 +170,16 @@ def _one_line(message: str) -> str:
     return "; ".join(line.strip() for line in message.splitlines() if line.strip())
 
 
+def probe(path: str | Path) -> None:
+    """Whether a file can be read as a picture, by its header. Errors: AssetError."""
+    import OpenImageIO as oiio
+
+    source = oiio.ImageInput.open(str(path))
+    if source is None:
+        raise AssetError(f"{path}: cannot be read as a picture: {oiio.geterror().strip()}")
+    source.close()
+
+
 def read(path: str | Path, encoding: Literal["auto", "srgb", "linear"] = "auto") -> tuple[NDArray[np.float32], bool]:
     """((H, W, C) float32, linear Rec. 709 with straight alpha; whether it has alpha).
 

@@ -68,34 +68,35 @@ def _mesh(value: Any) -> Any:
     """A mesh made in Python: a Mesh, trimesh's Trimesh (anything with vertices and faces), or (vertices, faces)."""
     if isinstance(value, Mesh | str | Path):
         return value
-    normals = uvs = colours = None
+    uvs = colours = None
     if hasattr(value, "vertices") and hasattr(value, "faces"):
-        vertices, faces = value.vertices, value.faces
-        # trimesh computes normals on demand; only those it was given are the mesh's own.
-        if "vertex_normals" in getattr(value, "_cache", ()):
-            normals = value.vertex_normals
+        # Its normals are not taken: trimesh computes them when it is asked, and then they look like its own.
+        vertices, faces = np.asarray(value.vertices), np.asarray(value.faces)
         visual: Any = getattr(value, "visual", None)
-        uvs = getattr(visual, "uv", None)
-        if getattr(visual, "kind", None) == "vertex":
+        uvs, kind = getattr(visual, "uv", None), getattr(visual, "kind", None)
+        if kind in ("vertex", "face"):
             # trimesh holds bytes, sRGB-encoded by custom.
-            encoded = np.asarray(visual.vertex_colors) / 255
+            encoded = np.asarray(visual.vertex_colors if kind == "vertex" else visual.face_colors) / 255
             colours = np.column_stack([srgb_to_linear(encoded[:, :3]), encoded[:, 3]])
+        if kind == "face" and colours is not None:
+            vertices, colours = vertices[faces].reshape(-1, 3), np.repeat(colours, 3, axis=0)
+            faces = np.arange(len(vertices)).reshape(-1, 3)
     elif isinstance(value, tuple | list) and len(value) == 2:
         vertices, faces = value
     else:
         raise fault("must be the path of a mesh file (or, in Python, a Mesh, a trimesh or a pair of vertices and faces)")
     try:
-        return Mesh.build(np.asarray(vertices, dtype=np.float64), np.asarray(faces), normals, uvs, colours)
+        return Mesh.build(np.asarray(vertices, dtype=np.float64), np.asarray(faces), None, uvs, colours)
     except AssetError as error:
         raise fault("; ".join(error.problems)) from None
 
 
 def _mesh_branch(value: Any) -> str:
-    return "value" if isinstance(value, Mesh) else "texture-table"
+    return "<value>" if isinstance(value, Mesh) else "<texture-table>"
 
 
 MeshSource = Annotated[
-    Annotated[SkipValidation[Mesh], Tag("value")] | Annotated[File, Tag("texture-table")],
+    Annotated[SkipValidation[Mesh], Tag("<value>")] | Annotated[File, Tag("<texture-table>")],
     Discriminator(_mesh_branch),
     WithJsonSchema({"type": "string", "format": "path"}),
 ]
@@ -103,19 +104,20 @@ Material = Annotated[Brdf, Chosen(BRDFS, "brdf")]
 
 
 def _material_branch(value: Any) -> str:
-    return "shorthand" if isinstance(value, str) else "table"
+    return "<shorthand>" if isinstance(value, str) else "<table>"
 
 
 class Object(Document):
     """Something to draw: a mesh (or a shape), where it is, what it is made of, and how it is shaded."""
 
     name: str | None = Field(None, description="for light linking, parents and messages")
-    mesh: Annotated[MeshSource, BeforeValidator(_mesh)] | None = Field(None, description="mesh file: OBJ, PLY, STL, glTF")
+    mesh: Annotated[MeshSource, BeforeValidator(_mesh)] | None = Field(None, description="mesh file: OBJ, PLY, STL, OFF, glTF")
     shape: Annotated[Shape, Chosen(SHAPES, "type", shorthand=True)] | None = Field(None, description="or a primitive")
     transform: Transform = Field(default_factory=Transform)
     parent: str | None = Field(None, description="name of the object whose transform comes after this one's")
     material: (
-        Annotated[Annotated[str, Tag("shorthand")] | Annotated[Material, Tag("table")], Discriminator(_material_branch)] | None
+        Annotated[Annotated[str, Tag("<shorthand>")] | Annotated[Material, Tag("<table>")], Discriminator(_material_branch)]
+        | None
     ) = Field(None, description="name of a material, or a material in place; left out: the mesh file's own, else grey phong")
     shading: Rate = Field("phong", description="where the model is evaluated: per face, per vertex or per pixel")
     normals: Normals = Field("auto", description="face; smooth up to the threshold; auto: the mesh's own where it has them")

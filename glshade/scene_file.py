@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from glshade import mesh_file
-from glshade.errors import SceneError
+from glshade.document import Document
+from glshade.errors import AssetError, SceneError
+from glshade.image import probe
 from glshade.scene import Film, Object, Scene
+from glshade.texture import NormalMap, Texture
 
 TEXT_SUFFIXES = (".toml", ".json")
 
@@ -42,9 +46,26 @@ def load(path: str | Path) -> Scene:
                 mesh_file.load(item.mesh)
             except SceneError as error:
                 problems.extend(f"{path}: objects[{index}].mesh: {problem}" for problem in error.problems)
+    for place, picture in _pictures(scene):
+        try:
+            probe(picture)
+        except AssetError as error:
+            problems.append(f"{path}: {place}: {error}")
     if problems:
         raise SceneError(problems)
     return scene
+
+
+def _pictures(scene: Scene) -> Iterator[tuple[str, Path]]:
+    """(key path, file) of every texture."""
+    materials: dict[str, Any] = {f"materials.{name}": material for name, material in scene.materials.items()}
+    materials |= {f"objects[{index}].material": item.material for index, item in enumerate(scene.objects)}
+    for place, material in materials.items():
+        if isinstance(material, Document):
+            for name in type(material).model_fields:
+                value = getattr(material, name)
+                if isinstance(value, Texture | NormalMap):
+                    yield f"{place}.{name}.texture", value.texture
 
 
 # Behind a bare mesh: a dark grey that light and dark objects both stand out from.

@@ -1,6 +1,6 @@
 """Shape: a primitive as a scene names it. The meshes themselves are made in primitives.py."""
 
-from functools import cache
+from functools import lru_cache
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -22,7 +22,7 @@ class Shape(Document):
         return _mesh(self)
 
 
-@cache
+@lru_cache(maxsize=256)
 def _mesh(shape: Shape) -> Mesh:
     return primitives.PRIMITIVES[shape.type](**shape.model_dump(exclude={"type"}))
 

@@ -150,8 +150,9 @@ def _varyings(plan: ProgramPlan, direction: str) -> str:
 
 def _varying(name: str, direction: str) -> str:
     """centroid: with several samples a pixel, the middle of one at the rim may lie outside the triangle, where an attribute
-    is extrapolated: negative light, stray highlights."""
-    return f"centroid {direction} {TYPES[name]} v_{name};"
+    is extrapolated: negative light, stray highlights. Texture coordinates bear that, but not being moved: the level of detail
+    is taken from their differences between pixels."""
+    return f"{'' if name == 'uv' else 'centroid '}{direction} {TYPES[name]} v_{name};"
 
 
 def _transforms(plan: ProgramPlan) -> str:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from glshade.assembly import Assembly, Instance
 from glshade.brdfs import Brdf
-from glshade.lights import LIGHTS, Light
+from glshade.lights import LIGHTS, Falloff, Light
 from glshade.plan import LightGroup, ProgramPlan
 from glshade.texture import Texture
 
@@ -25,7 +25,7 @@ Values = dict[str, NDArray[np.float32]]
 
 
 def rounded(value: Any) -> NDArray[np.float32]:
-    """float32; what is too large for it becomes infinite, and is refused where it matters."""
+    """float32; what is too large for it becomes infinite, and is refused by the renderer."""
     with np.errstate(over="ignore"):
         return np.asarray(value, dtype=np.float64).astype(np.float32)
 
@@ -96,7 +96,23 @@ def light_values(light: Light, eye: Array, exposure: float) -> dict[str, NDArray
     values = light.uniforms(eye)
     gain = 2.0**exposure * (1.0 if light.omnidirectional else math.pi)
     values["intensity"] = values["intensity"] * gain
+    if "r_min" in values:
+        # float32 ends at 3e38, and infinite light from no direction would be NaN.
+        strongest = float(np.abs(values["intensity"]).max())
+        values["r_min"] = max(values["r_min"], least_distance(strongest, getattr(light, "falloff", "none")))
     return {name: rounded(value) for name, value in values.items()}
+
+
+# The strongest light that a point is given.
+BRIGHTEST = 1e38
+FALLOFF_POWERS: dict[Falloff, int] = {"none": 0, "1/r": 1, "1/r^2": 2}
+
+
+def least_distance(strength: float, falloff: Falloff) -> float:
+    """The r_min [scene units] below which light of that strength would exceed BRIGHTEST: 2e-19 for 1/r^2 and a strength of 4."""
+    power = FALLOFF_POWERS[falloff]
+    # 4e-38 is the least: a normal number, as is its inverse.
+    return (max(strength, 4.0) / BRIGHTEST) ** (1 / power) if power else 0.0
 
 
 def grouped(assembly: Assembly, chosen: tuple[int, ...]) -> Mapping[tuple[str, str], list[Light]]:

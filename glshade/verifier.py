@@ -1,8 +1,9 @@
-"""Verifier: a GPU's picture of a scene against what the float64 reference says that it may be. docs/tolerance.md has the rule."""
+"""Verifier: a GPU's picture of a scene against what the float64 reference says that it may be. The rule: docs/tolerance.md."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -79,11 +80,52 @@ class Verdict:
         counts = ", ".join(f"{number} {kind.name.lower()}" for kind, number in c.counts.items() if number)
         lines = [
             f"{self.verdict}: {c.unexplained} pixels unexplained, {self.ambiguous:.2%} ambiguous, "
-            f"worst interior error {c.worst:.1e} (RMSE {c.rmse:.1e}, p99.9 {c.p999:.1e}, {c.used.max(initial=0):.0%} of what is allowed)",
+            f"worst interior error {c.worst:.1e} (RMSE {c.rmse:.1e}, p99.9 {c.p999:.1e}; at most {share(self.used)} "
+            "of what is allowed)",
             *self.reasons,
             counts,
         ]
         return "\n".join(lines)
+
+    @property
+    def used(self) -> float:
+        """The most that any pixel uses of what is allowed to it."""
+        return float(self.comparison.used.max(initial=0.0))
+
+    def report(self, folder: Path, title: str = "picture") -> Path:
+        """Writes the report: index.html with everything in it, and the pictures beside it. Returns the page."""
+        from glshade.comparison.report import Report, write
+
+        c = self.comparison
+
+        def colour(values: tuple[float, ...]) -> str:
+            return " ".join(f"{value:.6g}" for value in values)
+
+        facts = {
+            "driver": self.driver,
+            "unexplained": f"{c.unexplained} pixels",
+            "not finite": f"{c.non_finite} values",
+            "ambiguous": f"{c.ambiguous:.2%} of the picture, {c.doubtful:.2%} of what is drawn",
+            "worst error": f"{c.worst:.2e} (interior and seams)",
+            "RMSE": f"{c.rmse:.2e}",
+            "p99.9": f"{c.p999:.2e}",
+            "largest tolerance": f"{c.tolerance:.2e}",
+            "most used": f"{share(self.used)} of a pixel's own tolerance",
+            "time": ", ".join(f"{name} {seconds:.2f} s" for name, seconds in self.seconds.items()),
+        }
+        heads = ("x", "y", "object", "triangle", "class", "value", "least", "most", "error", "used", "arises in")
+        rows = [
+            [
+                *(str(p.x), str(p.y), p.object, str(p.triangle) if p.triangle >= 0 else "", p.kind),
+                *(colour(p.value), colour(p.low), colour(p.high)),
+                *(f"{p.error:.1e}", share(p.used), p.origin),
+            ]
+            for p in self.worst_pixels
+        ]
+        return write(
+            folder,
+            Report(title, self.verdict, self.reasons, self.picture, self.reference, c, self.classes, facts, heads, rows),
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
@@ -100,6 +142,11 @@ class Verdict:
             "driver": self.driver,
             "seconds": self.seconds,
         }
+
+
+def share(used: float) -> str:
+    """A share in words: percent, or how many times over."""
+    return f"{used:.0%}" if used < 10 else f"{used:.3g} times"
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +180,7 @@ def candidates(scene: Scene, *, shading: Rate | None = None, driver: Driver = LL
     over = over.take(np.lexsort((over.fragments.triangle, over.fragments.draw, over.fragments.pixel)))
     found_over = reference.bounds(inputs, over.fragments, driver)
     brightest = max((float(np.abs(b.value).max(initial=0.0)) for b in (found, found_over)), default=0.0)
-    scale = min(1.0, brightest) + float(np.finfo(np.float32).tiny)
+    scale = min(1.0, brightest)
     low, high = found.interval(scale)
     pixel, base, centre = solid.fragments.pixel, np.arange(len(solid.fragments)), found.centre()
     if len(over.fragments):
@@ -202,17 +249,23 @@ def single_sample(scene: Scene) -> Scene:
 
 
 def verdict_of(
-    picture: Array, expected: Candidates, mask: Flags | None = None, max_ambiguous: float = MAX_AMBIGUOUS, made_by: str = ""
+    picture: Array,
+    expected: Candidates,
+    mask: Flags | None = None,
+    max_ambiguous: float = MAX_AMBIGUOUS,
+    made_by: str = "",
+    *,
+    explain: bool = True,
 ) -> Verdict:
-    """Judges a picture (H, W, 3 or 4). Errors: GlshadeError."""
+    """Judges a picture (H, W, 3 or 4). explain: look for where errors arise, too. Errors: GlshadeError."""
     comparison = judge(picture, expected.expected, mask)
     reasons = []
     if comparison.non_finite:
-        reasons.append(f"{comparison.non_finite} values are not finite")
+        reasons.append(f"{comparison.non_finite} value{'s are' if comparison.non_finite > 1 else ' is'} not finite")
     if comparison.unexplained:
-        reasons.append(f"{comparison.unexplained} pixels are outside every interval that the reference allows")
-    must = expected.expected.classes
-    if comparison.empty and ((must == PixelClass.INTERIOR) | (must == PixelClass.SEAM)).any():
+        number = comparison.unexplained
+        reasons.append(f"{number} pixel{'s are' if number > 1 else ' is'} outside every interval that the reference allows")
+    if comparison.empty and not comparison.may_be_empty:
         reasons.append("the picture is empty, and the scene is not")
     verdict: Literal["verified", "failed", "inconclusive"] = "failed" if reasons else "verified"
     if not reasons and comparison.ambiguous > max_ambiguous:
@@ -226,7 +279,7 @@ def verdict_of(
         verdict,
         tuple(reasons),
         comparison,
-        tuple(_worst(picture, expected, comparison)),
+        tuple(_worst(picture, expected, comparison)) if explain else (),
         picture,
         expected.picture[..., :channels].astype(np.float32),
         np.where(mask, PixelClass.MASKED, _map(expected)) if mask is not None else _map(expected),
@@ -357,11 +410,11 @@ def _worst(picture: Array, expected: Candidates, comparison: Comparison) -> list
     key = np.nan_to_num(key, posinf=1e308)
     chosen = np.argpartition(-key, number - 1)[:number]
     chosen = chosen[np.argsort(-key[chosen], kind="stable")]
+    chosen = chosen[key[chosen] > 0]
+    hidden = _hidden(expected, [int(index) for index in chosen if excess[index] > 0])
     result = []
     channels = picture.shape[2]
     for index in chosen:
-        if key[index] == 0:
-            continue
         nearest = int(comparison.candidate[index])
         base = int(expected.base[nearest]) if nearest >= 0 else -1
         owner, triangle = "background", -1
@@ -385,14 +438,14 @@ def _worst(picture: Array, expected: Candidates, comparison: Comparison) -> list
                 high=tuple(map(float, high)),
                 error=float(comparison.error.reshape(-1)[index]),
                 used=float(used[index]),
-                origin=_origin(value, int(index), expected, nearest) if excess[index] > 0 else "-",
+                origin=_origin(value, expected, nearest, hidden.get(int(index))) if excess[index] > 0 else "-",
             )
         )
     return result
 
 
-def _origin(value: Array, index: int, expected: Candidates, nearest: int) -> Origin:
-    """What an unexplained value looks like."""
+def _origin(value: Array, expected: Candidates, nearest: int, hidden: tuple[Array, Array] | None) -> Origin:
+    """What an unexplained value looks like. hidden: intervals (K, 4) of all that lies at the pixel, seen or not."""
     if not np.isfinite(value).all():
         return "not finite"
     channels = len(value)
@@ -400,28 +453,22 @@ def _origin(value: Array, index: int, expected: Candidates, nearest: int) -> Ori
     if nearest < 0 or np.abs(value - background).max() <= 1e-6 * max(1.0, np.abs(background).max()):
         # Something where nothing is, or nothing where something is.
         return "coverage"
-    centre = expected.expected.centre[nearest, :channels]
-    room = (expected.expected.high - expected.expected.low)[nearest, :channels].max() + 1 / 255
-    if np.abs(value[:3] - linear_to_srgb(centre[:3])).max() <= room:
-        return "encode"
-    if _shown_behind(value, index, expected):
-        return "depth"
-    return "shading"
+    if hidden is not None:
+        low, high = (end[:, :channels] for end in hidden)
+        if ((value >= low) & (value <= high)).all(axis=1).any():
+            return "depth"
+    centre = expected.expected.centre[nearest, :3]
+    room = (expected.expected.high - expected.expected.low)[nearest, :3].max() + 1 / 255
+    return "encode" if np.abs(value[:3] - linear_to_srgb(centre)).max() <= room else "shading"
 
 
-def _shown_behind(value: Array, index: int, expected: Candidates) -> bool:
-    """Whether a surface that is hidden at the pixel would look like the value."""
+def _hidden(expected: Candidates, pixels: list[int]) -> dict[int, tuple[Array, Array]]:
+    """pixel -> (low, high) (K, 4) of every fragment there, hidden ones too."""
+    if not pixels:
+        return {}
     inputs = expected.inputs
-    here = []
-    for part in reference.rasterise(inputs, MARGIN):
-        mine = part.take(part.pixel == index)
-        if len(mine):
-            here.append(mine)
-    fragments = Fragments.joined(here)
-    if len(fragments) < 2:
-        return False
+    parts = (part.take(np.isin(part.pixel, pixels)) for part in reference.rasterise(inputs, MARGIN))
+    fragments = Fragments.joined(parts)
     found = reference.bounds(inputs, fragments)
-    low, high = found.interval(min(1.0, float(np.abs(found.value).max())))
-    channels = len(value)
-    inside: bool = bool(((value >= low[:, :channels]) & (value <= high[:, :channels])).all(axis=1).any())
-    return inside
+    low, high = found.interval(min(1.0, float(np.abs(found.value).max(initial=0.0))))
+    return {pixel: (low[fragments.pixel == pixel], high[fragments.pixel == pixel]) for pixel in pixels}

@@ -105,7 +105,8 @@ def _bounds(schema: Mapping[str, Any]) -> str:
 def default(schema: Mapping[str, Any], key: str) -> str:
     """The default as a scene file would write it."""
     if "default" not in schema:
-        return "required"
+        # A default that is made when it is needed is not in the schema.
+        return "-" if key in {"film", "camera", "transform"} else "required"
     value = schema["default"]
     if value is None or value in ("", {}) or (isinstance(value, dict) and value):
         return "-"

@@ -32,7 +32,9 @@ def cache_folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 
 @pytest.fixture(scope="session")
 def renderer() -> Iterator[Renderer]:
-    with Renderer() as renderer:
+    # test_osmesa.py runs the contracts on another backend, in a process of its own.
+    backend: Any = os.environ.get("GLSHADE_TEST_BACKEND", "auto")
+    with Renderer(backend) as renderer:
         yield renderer
 
 

@@ -63,6 +63,12 @@ def at_extremes(name: str, most: int) -> list[Brdf]:
     found = [model(**bright), model(**{key: declared[key].low for key in bright})]
     found += [model(**{**bright, key: declared[key].low}) for key in bright]
     found += [model(**bright, **{key: x}) for key, places in scalars.items() for x in places]
+    if len(scalars) <= 4:
+        # Two against each other: the ends of both, and ratios of 1e6.
+        for one, other in itertools.permutations(scalars, 2):
+            ends = [(scalars[one][0], scalars[other][-1])]
+            ends += [(1.0, 1e6), (100.0, 1e8)] if {1.0, 1e6, 1e8} <= set(scalars[one]) & set(scalars[other]) else []
+            found += [model(**bright, **{one: x, other: y}) for x, y in ends]
     if len(scalars) > 1:
         combinations = math.prod(map(len, scalars.values()))
         for _ in range(min(most, combinations) - len(found)):

@@ -9,8 +9,9 @@ import numpy as np
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from glshade import BRDFS, LIGHTS
+from glshade import BRDFS, LIGHTS, Scene
 from glshade.brdfs import Brdf, Parameter
+from glshade.shape import SHAPES as PRIMITIVES
 
 
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:
@@ -88,6 +89,33 @@ def fitted_cameras(draw: st.DrawFn) -> dict[str, Any]:
     if draw(st.booleans()):
         camera |= {"fit": True, "eye": draw(DIRECTIONS), "target": (0.0, 0.0, 0.0)}
     return camera
+
+
+SHAPES = st.sampled_from(
+    [
+        *({"type": "sphere", "segments": n, "rings": m} for n, m in ((5, 3), (16, 8), (48, 24))),
+        *({"type": name} for name in ("plane", "cube", "cylinder", "cone", "torus") if name in PRIMITIVES),
+    ]
+)
+
+
+@st.composite
+def scenes(draw: st.DrawFn, size: tuple[int, int] = (96, 64)) -> Scene:
+    """Whole scenes: a few shapes of any model at any rate, a few lights of any type, a camera that sees them all."""
+    objects = []
+    for material in draw(st.lists(MATERIALS, min_size=1, max_size=3)):
+        # Near each other, so that they meet and hide one another.
+        place = {**draw(transforms()), "translate": draw(st.tuples(*[st.floats(-3, 3, width=32)] * 3))}
+        rate = draw(st.sampled_from(["flat", "gouraud", "phong"]))
+        normals = draw(st.sampled_from(["auto", "face", "smooth"]))
+        sides = draw(st.sampled_from(["auto", "both"]))
+        objects.append(
+            {"shape": draw(SHAPES), "transform": place, "material": material}
+            | {"shading": rate, "normals": normals, "sides": sides}
+        )
+    sources = draw(st.lists(LIGHTS_OF_ANY_TYPE, min_size=1, max_size=4))
+    film = {"size": size, "background": draw(st.sampled_from([(0, 0, 0), (0.25, 0.5, 0.125), (0, 0, 0, 0)]))}
+    return Scene.model_validate({"film": film, "camera": draw(fitted_cameras()), "objects": objects, "lights": sources})
 
 
 def directions(count: int, seed: int, below: bool = False) -> NDArray[np.float32]:

@@ -24,12 +24,12 @@ Array = NDArray[np.float64]
 
 
 def _branch(value: Any) -> str:
-    return "texture-table" if isinstance(value, Mapping | Texture) else "value"
+    return "<texture-table>" if isinstance(value, Mapping | Texture) else "<value>"
 
 
 # What a parameter may be: three numbers (one stands for three) or one number, or a texture.
-Colour = Annotated[Annotated[Triple, Tag("value")] | Annotated[Texture, Tag("texture-table")], Discriminator(_branch)]
-Scalar = Annotated[Annotated[Finite, Tag("value")] | Annotated[Texture, Tag("texture-table")], Discriminator(_branch)]
+Colour = Annotated[Annotated[Triple, Tag("<value>")] | Annotated[Texture, Tag("<texture-table>")], Discriminator(_branch)]
+Scalar = Annotated[Annotated[Finite, Tag("<value>")] | Annotated[Texture, Tag("<texture-table>")], Discriminator(_branch)]
 
 
 @dataclass(frozen=True)
@@ -71,10 +71,11 @@ class Brdf(Document):
 
     # Whether the model looks at the tangent directions.
     anisotropic: ClassVar[bool] = False
-    # Whether its value depends on the viewer (beyond v being above the horizon).
+    # Paper, year and equations.
     source: ClassVar[str] = ""
 
     @classmethod
+    @cache
     def parameters(cls) -> dict[str, Parameter]:
         """name -> declaration, in the order of the GLSL struct."""
         found = {}
@@ -97,6 +98,7 @@ class Brdf(Document):
         return frozenset(asked.names)
 
     @classmethod
+    @cache
     def is_colour(cls, name: str) -> bool:
         """Whether the parameter has three channels."""
         default = cls.model_fields[name].default

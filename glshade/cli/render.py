@@ -38,6 +38,7 @@ class Size(click.ParamType[tuple[int, int]]):
     type=click.Choice(["flat", "gouraud", "phong"]),
     help="Per face, per vertex or per pixel, for the whole picture.",
 )
+@click.option("--reference", is_flag=True, help="Drawn by the float64 reference, on the CPU; one sample a pixel.")
 @click.option("--exposure", type=float, help="Overrides the film's exposure [stops].")
 @click.option("--backend", type=click.Choice(["auto", "egl", "osmesa", "standalone"]), default="auto", show_default=True)
 @click.option("--device", type=int, help="EGL device, as `glshade devices` counts them.")
@@ -47,6 +48,7 @@ def command(
     size: tuple[int, int] | None,
     samples: str | None,
     shading: Any,
+    reference: bool,
     exposure: float | None,
     backend: Any,
     device: int | None,
@@ -71,6 +73,13 @@ def command(
             first = error.errors(include_url=False)[0]
             raise click.BadParameter(first["msg"], param_hint=f"'--{first['loc'][0]}'") from None
         loaded = loaded.model_copy(update={"film": film})
+    if reference:
+        from glshade.reference import render
+
+        picture = render(loaded, shading=shading)
+        (picture if output.suffix.lower() in FLOAT_SUFFIXES else picture.encoded(loaded.film.encoding)).save(output)
+        click.echo(str(output))
+        return
     # Only a scene without faults is worth a context.
     from glshade.gl.renderer import Renderer
 

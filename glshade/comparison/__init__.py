@@ -60,7 +60,8 @@ class Comparison:
     counts: pixels of each class. non_finite: values. error (H, W): distance from the nearest accepted candidate's middle,
     the largest channel's. excess (H, W): how far outside every interval; 0 where a pixel is explained. used (H, W): the
     error's share of what is allowed. candidate (H*W,): the nearest one, -1: the background. worst, rmse, p999: of the errors
-    of interior pixels and seams. tolerance: the largest allowed at any of them.
+    of interior pixels and seams. tolerance: the largest allowed at any of them. empty: whether the picture is the background
+    alone; may_be_empty: whether it may be.
     """
 
     counts: dict[PixelClass, int]
@@ -75,6 +76,7 @@ class Comparison:
     p999: float
     tolerance: float
     empty: bool
+    may_be_empty: bool
 
     @property
     def ambiguous(self) -> float:
@@ -145,6 +147,7 @@ def judge(picture: Array, expected: Expected, mask: Flags | None = None) -> Comp
     low, high, centre = (part[:, :channels] for part in (expected.low, expected.high, expected.centre))
     outside = np.maximum(np.maximum(low - of, of - high), 0).max(axis=1)
     error = np.abs(of - centre)
+    unseen = ((low <= background) & (background <= high)).all(axis=1)
     # Of what is allowed on the side where the value lies.
     room = np.where(of >= centre, high - centre, centre - low)
     share = (error / np.maximum(room, 1e-300)).max(axis=1)
@@ -184,6 +187,7 @@ def judge(picture: Array, expected: Expected, mask: Flags | None = None) -> Comp
         p999=float(np.quantile(interior, 0.999)) if len(interior) else 0.0,
         tolerance=float(allowed[counted].max(initial=0.0)),
         empty=bool((from_background == 0).all()) and not broken.any(),
+        may_be_empty=bool((unseen | expected.open[expected.pixel]).all()),
     )
 
 

@@ -52,6 +52,9 @@ def material(file: File, header: dict[str, Any], buffers: list[bytes], given: di
             result["normal_map"] = {"texture": picture[0], "scale": scale, "wrap": picture[1]}
     if given.get("doubleSided", False):
         result["sides"] = "both"
+    elif "alpha_mode" in result:
+        # What can be seen through would show its back faces, which glTF culls; opaque solids are left to `auto`.
+        result["sides"] = "front"
     return result
 
 

@@ -59,6 +59,9 @@ def _material(file: File, name: str, given: dict[str, str]) -> Material:
         texture, wrap = _map_statement(file, given["norm"])
         if texture:
             material["normal_map"] = {"texture": texture} | wrap
+    unused = sorted(key for key in given if key.startswith(("map_", "bump", "refl", "disp")) and key != "map_kd")
+    if unused:
+        file.warn(f"material '{name}': {', '.join(unused)} not used")
     # Tr is 1 - d, but some programs write opacity there. Nobody writes a material that cannot be seen, so 1 is theirs
     # and means opaque.
     tr = (numbers("tr") or [0.0])[0]

@@ -8,7 +8,7 @@ from collections import OrderedDict
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from types import TracebackType
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import moderngl
 import numpy as np
@@ -19,6 +19,7 @@ from glshade.assembly import Assembly, Instance, assemble
 from glshade.camera import window
 from glshade.clusters import facing
 from glshade.digest import digest
+from glshade.errors import SceneError
 from glshade.gl.context import Backend, Context, open_context
 from glshade.gl.frame import Frame, Storage
 from glshade.gl.program import Program
@@ -80,7 +81,7 @@ class Prepared:
 class Renderer:
     """Draws scenes. A context manager: `with glshade.Renderer() as renderer: image = renderer.render(scene)`.
 
-    backend: auto, egl or standalone; device: an index of `glshade devices`. Errors: ContextError.
+    backend: auto, egl, osmesa or standalone; device: an index of `glshade devices`. Errors: ContextError.
     """
 
     def __init__(self, backend: Backend = "auto", device: int | None = None) -> None:
@@ -109,6 +110,9 @@ class Renderer:
         overrules every object's. tile: the largest side drawn in one piece [pixels]; left out: what the driver can.
         Errors: SceneError, ShaderError.
         """
+        for given, allowed in ((dtype, get_args(DType)), (shading, (None, *get_args(Rate)))):
+            if given not in allowed:
+                raise ValueError(f"{given!r} is none of {', '.join(map(repr, allowed))}")
         # Another renderer, or another program in this process, may have made its own context current.
         with self.context.gl:
             self.context.gl.gc()
@@ -125,10 +129,12 @@ class Renderer:
             direct = False
             prepared = self._prepare(scene, shading, "linear")
         width, height = film.size
-        side = min(tile or TILE, self.context.largest_side)
+        # Several samples take several times the memory.
+        side = min(tile or (TILE if film.samples == 1 else TILE // 2), self.context.largest_side)
         # At the border of what it draws, a driver moves a centroid to the samples that are there; an apron keeps that out.
         apron = 2 if film.samples > 1 and max(width, height) > side else 0
-        side = max(side - 2 * apron, 1)
+        # An even number: derivatives are taken in blocks of two by two pixels, which must not shift.
+        side = max((side - 2 * apron) & ~1, 2)
         channels = 3 if opaque else 4
         on_gpu = dtype == "uint8" and len(passes) == 1
         pixels = self._buffer((height, width, 4), np.uint8 if on_gpu else np.float32)
@@ -302,6 +308,9 @@ class Renderer:
             values = object_uniforms(here, instance, assembly.view.eye)
             if here.ambient == "constant":
                 values |= ambient_radiance(instance, assembly, exposure)
+            for name, value in (*values.items(), *lights.items()):
+                if not np.isfinite(value).all():
+                    raise SceneError(f"{instance.name}: {name.removeprefix('u_')} is too large for float32")
             samplers = [(name, self._texture(texture)) for name, texture in textures(here, instance.material).items()]
             vertices = self._vertices.array(instance.mesh, program, order)
             page = [group[index] for group in pages if index < len(group)]
@@ -362,12 +371,20 @@ class Renderer:
 
     def _buffer(self, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
         """An array for a picture: one that no image holds any more, else a new one, which costs a page fault every 4 KiB."""
-        for buffer in self._buffers:
-            # Held by the list, by the loop and by getrefcount's own argument, and by nobody else.
-            if sys.getrefcount(buffer) == 3 and buffer.shape == shape and buffer.dtype == dtype:
+        for buffer, held in zip(self._buffers, _references(self._buffers), strict=True):
+            if held == FREE and buffer.shape == shape and buffer.dtype == dtype:
                 return buffer
         self._buffers = [*self._buffers[-1:], np.empty(shape, dtype=dtype)]
         return self._buffers[-1]
+
+
+def _references(arrays: list[NDArray[Any]]) -> list[int]:
+    """How often each array is referred to; the list's own, and this function's, count too."""
+    return [sys.getrefcount(array) for array in arrays]
+
+
+# What _references counts for an array that nobody else holds: it differs between versions of Python.
+FREE = _references([np.empty(0)])[0]
 
 
 def _paged(plan: ProgramPlan) -> list[Any]:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
+from collections.abc import Callable
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import moderngl
 import numpy as np
@@ -22,38 +23,33 @@ ATTRIBUTES = {
     "a_centroid_uv": ("centroid_uvs", 2),
     "a_centroid_colour": ("centroid_colours", 4),
 }
-# Meshes kept on the GPU; the least recently used leave first.
-KEPT = 4096
 
 
 class Vertices:
-    """The buffers of a context, by mesh."""
+    """The buffers of a context, by mesh; they go when their mesh goes."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
-        self._buffers: OrderedDict[tuple[Any, ...], tuple[Mesh, moderngl.Buffer]] = OrderedDict()
+        self._buffers: WeakKeyDictionary[Mesh, dict[tuple[str, ...], moderngl.Buffer]] = WeakKeyDictionary()
 
     def array(self, mesh: Mesh, program: Program, order: np.ndarray[Any, Any] | None = None) -> moderngl.VertexArray:
         """The mesh, ready to be drawn by the program. order: the triangles to draw, by number; None: all."""
         names = tuple(name for name in program.attributes if name in ATTRIBUTES)
         sizes = [ATTRIBUTES[name][1] for name in names]
-        buffer = self._buffer((id(mesh), names), mesh, lambda: _interleaved(mesh, names))
+        buffer = self._buffer(mesh, names, lambda: _interleaved(mesh, names))
         if order is None:
-            indices = self._buffer((id(mesh), "triangles"), mesh, mesh.triangles.tobytes)
+            indices = self._buffer(mesh, (), mesh.triangles.tobytes)
         else:
             indices = self._context.gl.buffer(mesh.triangles[order].tobytes())
         layout = " ".join(f"{size}f" for size in sizes)
         return self._context.gl.vertex_array(program.gl, [(buffer, layout, *names)], indices)
 
-    def _buffer(self, key: tuple[Any, ...], mesh: Mesh, data: Any) -> moderngl.Buffer:
-        # The mesh is kept beside its buffer, so that no other object can come to have its id.
-        kept = self._buffers.get(key)
-        if kept is None:
-            kept = self._buffers[key] = (mesh, self._context.gl.buffer(data()))
-            if len(self._buffers) > KEPT:
-                self._buffers.popitem(last=False)
-        self._buffers.move_to_end(key)
-        return kept[1]
+    def _buffer(self, mesh: Mesh, key: tuple[str, ...], data: Callable[[], bytes]) -> moderngl.Buffer:
+        """key: the attributes; none for the triangles."""
+        kept = self._buffers.setdefault(mesh, {})
+        if key not in kept:
+            kept[key] = self._context.gl.buffer(data())
+        return kept[key]
 
 
 def _interleaved(mesh: Mesh, names: tuple[str, ...]) -> bytes:

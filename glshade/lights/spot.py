@@ -16,22 +16,23 @@ class SpotLight(Placed):
 
     type: Literal["spot"] = "spot"
     direction: Direction = Field((0.0, -1.0, 0.0), description="the way the cone points: from the light to the scene")
-    inner: Annotated[float, Field(ge=0, le=180)] = Field(
-        20.0, description="from the axis to where the light begins to fade [degrees]"
+    inner: Annotated[float, Field(ge=0, le=180)] | None = Field(
+        None, description="from the axis to where the light begins to fade; left out: two thirds of outer [degrees]"
     )
     outer: Annotated[float, Field(gt=0, le=180)] = Field(30.0, description="from the axis to where the light ends [degrees]")
 
     @classmethod
     def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
         if isinstance(data, Mapping):
-            inner, outer = data.get("inner", 20.0), data.get("outer", 30.0)
+            inner, outer = data.get("inner"), data.get("outer", 30.0)
             if isinstance(inner, int | float) and isinstance(outer, int | float) and inner > outer:
                 yield ("inner",), f"{inner:g} must not be larger than outer, {outer:g}"
 
     def uniforms(self, eye: Array) -> dict[str, Any]:
         axis, _ = direction_and_distance(-np.array(self.direction))
+        start = 2 * self.outer / 3 if self.inner is None else self.inner
         # 1 - cos x = 2 sin^2(x / 2) keeps its digits for small angles.
-        inner, outer = (2 * math.sin(math.radians(angle) / 2) ** 2 for angle in (self.inner, self.outer))
+        inner, outer = (2 * math.sin(math.radians(angle) / 2) ** 2 for angle in (start, self.outer))
         # An edge of no width would divide 0 by 0; one part in a million of the cone is far below a pixel.
         width = max(outer - inner, 1e-6 * outer)
         return {**super().uniforms(eye), "cone_outer": outer, "axis": axis, "cone_scale": 1 / width}

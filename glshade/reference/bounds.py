@@ -8,7 +8,7 @@ model: nothing here knows which one it is.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from itertools import product
 from typing import Any
 
@@ -43,8 +43,12 @@ UNIT = 4 * U
 AGAIN = 4.0
 # ... and what it costs at least: 16 float32 steps of the value, or of the picture's brightest up to 1.
 STEPS = 16 * 2 * U
-# Where the level of detail is looked at, in shares of how far the driver's may be off.
-LEVELS = (-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75, 1.0)
+# Denormal numbers are flushed (1.2e-38), and what is multiplied afterwards may be large; nobody sees so little light.
+FLUSHED = 1e-30
+# How often the level of detail is looked at between the least and the most that it may be.
+LEVELS = 9
+# ... and a place in a texture between the ends of its error.
+SHIFTS = 5
 # An edge is near a pixel's centre within this [pixels]: the margin of coverage, and the steps that its corners are snapped by.
 NEAR = (MARGIN + 2) / SUBPIXELS
 # Slimmer (L^2 over twice the area) a triangle may turn over when its corners are snapped.
@@ -64,7 +68,7 @@ class Driver:
     plane: float = 2.0
     window: float = 2.0
     snap: float = 0.0
-    level: float = 0.1
+    level: float = 0.05
     texel: float = 0.0
 
 
@@ -92,7 +96,7 @@ class Bounds:
 
     def arithmetic(self, scale: float) -> Array:
         """tau (N, 3). scale: the picture's brightest, at most 1."""
-        result: Array = AGAIN * self.rounding + STEPS * np.maximum(self.magnitude, scale)
+        result: Array = AGAIN * self.rounding + STEPS * np.maximum(self.magnitude, scale) + FLUSHED
         return result
 
     def interval(self, scale: float) -> tuple[Array, Array]:
@@ -139,15 +143,14 @@ def alphas(inputs: Inputs, fragments: Fragments, driver: Driver = LLVMPIPE) -> t
 def bounds(inputs: Inputs, fragments: Fragments, driver: Driver = LLVMPIPE) -> Bounds:
     """The limits of fragments of any draws in any order."""
     result = Bounds.empty(len(fragments))
-    vertices: dict[tuple[int, float], _AtVertices] = {}
     for draw, which, some in by_draw(inputs, fragments):
         planes = _Planes(draw, some, inputs.size, driver)
         if draw.instance.rate == "phong":
             found = _per_pixel(draw, some, inputs.size, planes, driver)
         elif draw.instance.rate == "gouraud":
-            found = _per_vertex(draw, some, inputs.size, planes, vertices)
+            found = _per_vertex(draw, some, inputs.size, planes)
         else:
-            found = _per_face(draw, some)
+            found = _per_face(draw, some, driver)
         for name, values in found.items():
             getattr(result, name)[which] = values
         if draw.alpha_mode == "blend":
@@ -210,7 +213,7 @@ class _Planes:
     """
 
     def __init__(self, draw: Draw, fragments: Fragments, size: tuple[int, int], driver: Driver) -> None:
-        self.driver = driver
+        self.driver, self.size = driver, size
         self.triangles, self.place = np.unique(fragments.triangle, return_inverse=True)
         self.corners = draw.triangles[self.triangles]
         at = draw.clip[self.corners]
@@ -279,14 +282,15 @@ class _Planes:
 
 @dataclass(frozen=True, eq=False)
 class _Errors:
-    """How far each attribute of a Surface may be off, in its shape; None where it does not count."""
+    """How far each attribute of a Surface may be off, in its shape; None where it does not count. level: least and most (N,)
+    of what to add to it."""
 
     position: Array | None = None
     normal: Array | None = None
     tangent: Array | None = None
     uv: Array | None = None
     colour: Array | None = None
-    level: float = 0.0
+    level: tuple[Array, Array] | None = None
 
 
 def _errors(draw: Draw, fragments: Fragments, surface: Surface, planes: _Planes, driver: Driver) -> _Errors:
@@ -302,14 +306,13 @@ def _errors(draw: Draw, fragments: Fragments, surface: Surface, planes: _Planes,
         if corner.tangent is not None:
             found["tangent"] = planes.errors(corner.tangent[place][..., :3], UNIT)
     if corner.uv is not None and surface.footprint is not None:
-        found["uv"] = planes.errors(corner.uv[place], 0.0)
+        # Within a texture the place is known to float32 steps of its whole side: wrapped, scaled and less half a texel.
+        found["uv"] = planes.errors(corner.uv[place], 4 * U)
         samplers = _samplers(draw)
         if driver.texel:
             largest = max(1 / min(s.widths[0], s.heights[0]) for s in samplers)
             found["uv"] = found["uv"] + driver.texel * largest
-        # Textures that are magnified everywhere know no level of detail.
-        if any((s.level(*surface.footprint) > -driver.level).any() for s in samplers):
-            found["level"] = driver.level
+        found["level"] = _levels(draw, fragments, surface, planes.size, driver)
     if corner.colour is not None:
         found["colour"] = planes.errors(corner.colour[place], 0.0)
     return _Errors(**found)
@@ -338,16 +341,7 @@ def _per_pixel(draw: Draw, fragments: Fragments, size: tuple[int, int], planes: 
     return _spread(draw, shown, surface, _errors(draw, fragments, surface, planes, driver))
 
 
-@dataclass(frozen=True, eq=False)
-class _AtVertices:
-    """What `_spread` says of all vertices of a draw, for one side."""
-
-    found: dict[str, Array] = field(default_factory=dict)
-
-
-def _per_vertex(
-    draw: Draw, fragments: Fragments, size: tuple[int, int], planes: _Planes, kept: dict[tuple[int, float], _AtVertices]
-) -> dict[str, Array]:
+def _per_vertex(draw: Draw, fragments: Fragments, size: tuple[int, int], planes: _Planes) -> dict[str, Array]:
     corners = draw.triangles[fragments.triangle]
     x, y = places(fragments, size, AT_CENTRE)
     weight = weights(draw, fragments.triangle, x, y, size, derivatives=False).values
@@ -365,7 +359,7 @@ def _per_vertex(
         for name, values in found.items():
             by = weight[which] if name == "value" else np.abs(weight[which])
             result.setdefault(name, np.zeros((len(fragments), 3)))[which] = blend(by, values[place])
-        # The vertices of the other side's triangles are among all of them only by chance; theirs is not asked for.
+        # Triangles of which only the other side is seen get planes of no meaning, which nobody asks for.
         table = np.zeros((len(draw.instance.mesh.positions), 3))
         table[vertices] = found["value"]
         interpolation[which] = planes.errors(table[planes.corners], 0.0)[which]
@@ -373,7 +367,7 @@ def _per_vertex(
     return result
 
 
-def _per_face(draw: Draw, fragments: Fragments) -> dict[str, Array]:
+def _per_face(draw: Draw, fragments: Fragments, driver: Driver) -> dict[str, Array]:
     faces, place = np.unique(fragments.triangle, return_inverse=True)
     vertices = draw.triangles[faces, 2]
     surface = at_vertices(draw, vertices, np.float64, centroids=True)
@@ -384,7 +378,7 @@ def _per_face(draw: Draw, fragments: Fragments) -> dict[str, Array]:
             surface = replace(surface, side=np.where(facing, 1.0, -1.0).astype(surface.normal.dtype))
         return shown(draw, surface, material)
 
-    found = _spread(draw, seen, surface, _vertex_errors(draw, surface, vertices, LLVMPIPE))
+    found = _spread(draw, seen, surface, _vertex_errors(draw, surface, vertices, driver))
     return {name: values[place] for name, values in found.items()}
 
 
@@ -408,21 +402,22 @@ def _spread(draw: Draw, evaluate: Callable[..., Array], surface: Surface, errors
             if number in (1, 6):
                 rounding = np.maximum(rounding, np.abs(evaluate(draw, _narrow(turned)) - there[-1]))
         reaches(there)
-    for name in ("position", "tangent", "uv"):
+    for name in ("position", "tangent"):
         error = getattr(errors, name)
         for axis in range(0 if error is None else error.shape[1]):
-            there = []
-            for sign in (-1.0, 1.0):
-                moved = getattr(surface, name).copy()
-                moved[:, axis] += sign * error[:, axis]
-                # A texture is read anew where it is read elsewhere.
-                there.append(evaluate(draw, replace(surface, **{name: moved}), None if name == "uv" else material))
-            reaches(there)
+            moves = [_moved(surface, name, axis, sign * error[:, axis]) for sign in (-1.0, 1.0)]
+            reaches([evaluate(draw, moved, material) for moved in moves])
+    for axis, error in enumerate([] if errors.uv is None else errors.uv.T):
+        # Textures are read anew, and have kinks wherever one texel hands over to the next.
+        shifts = _spaced(-error, error, SHIFTS)
+        there = [evaluate(draw, _moved(surface, "uv", axis, shift)) for shift in shifts]
+        margin = _between(there)
+        reaches([*(other - margin for other in there), *(other + margin for other in there)])
     if errors.colour is not None and surface.colour is not None:
         reaches([evaluate(draw, replace(surface, colour=surface.colour + sign * errors.colour)) for sign in (-1, 1)])
     level = np.zeros_like(value)
-    if errors.level:
-        there = [evaluate(draw, replace(surface, level=share * errors.level)) if share else value for share in LEVELS]
+    if errors.level is not None:
+        there = [evaluate(draw, replace(surface, level=offset)) for offset in _spaced(*errors.level, LEVELS)]
         margin = _between(there)
         reaches([*(other - margin for other in there), *(other + margin for other in there)])
         level = np.maximum.reduce([np.abs(other - value) for other in there]) + margin
@@ -437,12 +432,13 @@ def _alphas(draw: Draw, surface: Surface, errors: _Errors, driver: Driver) -> Ar
     value = alpha_of(draw, surface)
     there = [value]
     if draw.alpha_sampler is not None and errors.uv is not None:
-        for axis, sign in product((0, 1), (-1.0, 1.0)):
-            uv = surface.uv.copy() if surface.uv is not None else errors.uv
-            uv[:, axis] += sign * errors.uv[:, axis]
-            there.append(alpha_of(draw, replace(surface, uv=uv)))
-        if errors.level:
-            several = [alpha_of(draw, replace(surface, level=share * errors.level)) for share in LEVELS]
+        for axis in (0, 1):
+            shifts = _spaced(-errors.uv[:, axis], errors.uv[:, axis], SHIFTS)
+            several = [alpha_of(draw, _moved(surface, "uv", axis, shift)) for shift in shifts]
+            margin = _between(several)
+            there += [np.minimum.reduce(several) - margin, np.maximum.reduce(several) + margin]
+        if errors.level is not None:
+            several = [alpha_of(draw, replace(surface, level=offset)) for offset in _spaced(*errors.level, LEVELS)]
             margin = _between(several)
             there += [np.minimum.reduce(several) - margin, np.maximum.reduce(several) + margin]
     slack: Array = 8 * U * np.abs(value)
@@ -453,12 +449,53 @@ def _alphas(draw: Draw, surface: Surface, errors: _Errors, driver: Driver) -> Ar
     return np.stack([value, low, high])
 
 
+def _levels(
+    draw: Draw, fragments: Fragments, surface: Surface, size: tuple[int, int], driver: Driver
+) -> tuple[Array, Array] | None:
+    """(least, most), each (N,), of what a driver's level of detail may differ by; None where no texture is made smaller.
+
+    A driver may take differences within a square of 2 x 2 pixels (OpenGL 4.6 core, 8.14.1; GLSL 4.60, 8.14.1) where the
+    formula has derivatives.
+    """
+    assert surface.footprint is not None
+    samplers = _samplers(draw)
+    exact = [sampler.level(*surface.footprint) for sampler in samplers]
+    if max(level.max(initial=-np.inf) for level in exact) < -1:
+        return None
+    vertices, place = np.unique(draw.triangles[fragments.triangle], return_inverse=True)
+    at_corners = at_vertices(draw, vertices, np.float64).uv
+    assert at_corners is not None
+    corner = at_corners[place.reshape(-1, 3)]
+    x, y = (np.floor(p / 2) * 2 + 0.5 for p in places(fragments, size, AT_CENTRE))
+    uv = {
+        (i, j): blend(weights(draw, fragments.triangle, x + i, y + j, size, derivatives=False).values, corner)
+        for i, j in product((0, 1), repeat=2)
+    }
+    least, most = np.zeros(len(x)), np.zeros(len(x))
+    for sampler, level in zip(samplers, exact, strict=True):
+        for i, j in product((0, 1), repeat=2):
+            other = sampler.level(uv[1, j] - uv[0, j], uv[i, 1] - uv[i, 0]) - level
+            least, most = np.minimum(least, other), np.maximum(most, other)
+    return least - driver.level, most + driver.level
+
+
+def _moved(surface: Surface, name: str, axis: int, by: Array) -> Surface:
+    values = getattr(surface, name).copy()
+    values[:, axis] += by
+    return replace(surface, **{name: values})
+
+
+def _spaced(low: Array, high: Array, count: int) -> list[Array]:
+    """`count` numbers from low to high (N,)."""
+    return [low + (high - low) * (k / (count - 1)) for k in range(count)]
+
+
 def _between(samples: list[Array]) -> Array:
-    """How far a function may reach past the largest of its evenly spaced samples: a quarter of its bend, which is what a
-    kink halfway between two of them (one mip level handing over to the next) makes; a parabola makes half of that."""
+    """How far a function may reach past the largest of its evenly spaced samples: half its largest second difference, which
+    is what a kink halfway between two of them makes (one mip level handing over to the next); a parabola makes a quarter."""
     s = np.stack(samples)
     bend: Array = np.abs(s[2:] - 2 * s[1:-1] + s[:-2]).max(axis=0)
-    return bend / 4
+    return bend / 2
 
 
 def _samplers(draw: Draw) -> list[Sampler]:

@@ -255,7 +255,7 @@ def toward_viewer(draw: Draw, position: Array) -> Array:
 
 
 def shown(draw: Draw, surface: Surface, material: SimpleNamespace | None = None) -> Array:
-    """(N, 3): the sum over the lights of what the points show to the viewer. material: as `material_of` gives it, if at hand."""
+    """(N, 3): the sum over the lights of what the points show to the viewer. material: `material_of` them, if at hand."""
     dtype = surface.position.dtype
     m = material or material_of(draw, surface)
     total = np.zeros((len(surface.position), 3), dtype=dtype)

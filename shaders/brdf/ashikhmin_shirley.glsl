@@ -18,15 +18,19 @@ vec3 brdf_cos(AshikhminShirley m, Frame f, vec3 l, vec3 v) {
     vec3 H = l + v;
     float H2 = dot(H, H);
     float inverse_H = inversesqrt(max(H2, 1e-12));
-    float hu = dot(f.t, H) * inverse_H;
-    float hv = dot(f.b, H) * inverse_H;
     float LoH = min(0.5 * H2 * inverse_H, 1.0);  // l.h = |H| / 2
+    // H.u and H.v are squared before they are divided by |H|^2: the exponent, on whose every rounding the lobe hangs, has
+    // fewer of them than with h.u and h.v.
+    float Hu = dot(f.t, H);
+    float Hv = dot(f.b, H);
+    float Hu2 = Hu * Hu;
+    float Hv2 = Hv * Hv;
     // (n.h)^((pu hu^2 + pv hv^2) / (1 - (n.h)^2)) with sin^2 = hu^2 + hv^2, and log(n.h) = log(1 - sin^2) / 2: the
     // division cancels, so h = n is no longer 0/0. Past sin^2 = 1/4 the plain logarithm has its digits.
-    float sin2 = hu * hu + hv * hv;
+    float sin2 = (Hu2 + Hv2) / H2;
     float NoH = (NoL + NoV) * inverse_H;
     float log_ratio = sin2 < 0.25 ? 0.5 * log1m_over(sin2) : log(NoH) / sin2;
-    float lobe = exp((m.pu * hu * hu + m.pv * hv * hv) * log_ratio);
+    float lobe = exp((m.pu * Hu2 + m.pv * Hv2) / H2 * log_ratio);
     float norm = sqrt(m.pu + 1.0) * sqrt(m.pv + 1.0) * (0.125 * INV_PI);
     float specular = norm * lobe * NoL / (LoH * max(NoL, NoV));
     // 1 - (1 - x/2)^5 by its factors, so that small cosines are not lost in the difference from 1.

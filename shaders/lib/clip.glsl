@@ -1,5 +1,8 @@
 // From the object's own space to the picture, through world space relative to the eye: float32 keeps its digits where the
 // viewer is, however far from the origin that may be.
+// Further lights are added where the depth is equal, by another program.
+invariant gl_Position;
+
 in vec3 a_position;
 uniform mat4 u_world_from_object;
 uniform mat4 u_clip_from_world;

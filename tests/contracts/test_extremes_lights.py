@@ -43,10 +43,18 @@ def test_at_the_viewer(falloff: Any, renderer: Renderer) -> None:
     assert worst <= WORST
 
 
+@pytest.mark.parametrize("intensity", [1e-30, 1.0, -1e4, 1e30])
 @pytest.mark.parametrize("falloff", ["1/r", "1/r^2"])
-@pytest.mark.parametrize("r_min", [1e-15, 1e15])
-def test_any_least_distance(r_min: float, falloff: Any, renderer: Renderer) -> None:
-    everywhere(lambda m: scene(triangles(CORNERS, m), [point(1, 1, 1, falloff=falloff, r_min=r_min)], camera=ABOVE), renderer)
+@pytest.mark.parametrize("r_min", [1e-300, 1e-30, 1e-20, 1e-15, 1e15, 1e30])
+def test_any_least_distance(r_min: float, falloff: Any, intensity: float, renderer: Renderer) -> None:
+    """At a corner, exactly, where no distance is left, and beside it. Infinitely strong times no direction would be NaN."""
+    for place in ((1.0, 1.0, 0.0), (1.0, 1.0, 1e-15), (1.0, 1.0, 1.0)):
+        lamp = point(*place, falloff=falloff, r_min=r_min, intensity=intensity)
+        for material in MATERIALS.values():
+            for rate in RATES:
+                picture = scene(triangles(CORNERS, material), [lamp], (8, 8), camera=ABOVE)
+                pixels = renderer.render(picture, dtype="float32", shading=rate).pixels
+                assert np.isfinite(pixels).all(), rate
 
 
 NARROW = math.degrees(1e-4)
@@ -92,11 +100,12 @@ def test_any_strength(name: str, intensity: float, renderer: Renderer) -> None:
                 for x in (1.0, intensity)
             )
             assert many.drawn == one.drawn > 500
-            # Light is linear. Measured: 2e-7 of the peak. Below the smallest normal float stages may flush it to 0.
+            # Light is linear. Measured: 3.2e-6 of the peak, from the plane equations of gouraud; else 1.2e-7. Below the
+            # smallest normal float stages may flush it to 0.
             peak = one.pixels[..., :3].max()
             change = many.pixels[..., :3].astype(np.float64) / np.float64(np.float32(intensity)) - one.pixels[..., :3]
             assert peak > 0.01
-            assert np.abs(change).max() <= 1e-6 * peak or abs(intensity) <= 1e-37
+            assert np.abs(change).max() <= 1e-5 * peak or abs(intensity) <= 1e-37
 
 
 @pytest.mark.parametrize("count", [1, 8, 9])

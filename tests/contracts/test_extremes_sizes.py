@@ -38,6 +38,20 @@ def test_of_any_size(size: float, light: str, renderer: Renderer) -> None:
         assert worst <= WORST
 
 
+@pytest.mark.parametrize("size", [1e3, 1e4])
+def test_a_ground_much_larger_than_the_view(size: float, renderer: Renderer) -> None:
+    """A float32 position interpolated over a triangle of that size is 6e-8 of it off: v turns by that over its distance of 3.
+
+    llvmpipe clips in float32, too: at 1e6 the edge between two triangles moves by a pixel, and from 1e7 on parts are lost.
+    """
+    ground = {"shape": "plane", "transform": {"translate": (0, -1, 0), "scale": size}}
+    camera = {**CAMERA, "near": 0.1, "far": 1e9}
+    slack = 2**-24 * size / 3
+    drawn, worst = everywhere(lambda m: scene({**ground, "material": m}, [SUN], camera=camera), renderer, slack)
+    assert drawn > 1000
+    assert worst <= WORST + slack
+
+
 @pytest.mark.xfail(strict=True, reason="lengths below 1e-18 and above 1e19 have no square in float32: shaders/lib/unit.glsl")
 @pytest.mark.parametrize("size", [1e-20, 1e20])
 def test_of_a_size_whose_square_float32_has_not(size: float, renderer: Renderer) -> None:

@@ -449,10 +449,10 @@ class TestSize:
     @pytest.mark.parametrize("rate", RATES)
     @pytest.mark.parametrize("tile", [1000, 32, 7])
     def test_tiles_are_the_same_as_one_piece(self, tile: int, rate: str, draw: Any) -> None:
-        """Measured on llvmpipe: at most 3e-6, in 2 of 1000 pixels. A tile's matrix is rounded to float32 on its own."""
+        """Measured on llvmpipe: at most 6e-6, in 2 of 1000 pixels. A tile's matrix is rounded to float32 on its own."""
         whole = draw(**self.SCENE, shading=rate)
         difference = np.abs(whole - draw(**self.SCENE, shading=rate, tile=tile))
-        assert difference.max() <= (5e-6 if tile < 61 else 0)
+        assert difference.max() <= (1e-5 if tile < 61 else 0)
         assert whole.max() > 0.2
 
     @pytest.mark.parametrize("samples", [2, 4, 8])

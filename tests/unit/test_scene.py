@@ -263,11 +263,23 @@ class TestMadeInPython:
         assert np.array_equal(mesh.triangles, box.faces)
         assert mesh.normals is None, "trimesh computes normals; these are not the mesh's own"
 
-    def test_the_normals_that_a_trimesh_was_given(self) -> None:
-        normals = np.tile([0.0, 0.0, 1.0], (3, 1))
-        mesh = Object(mesh=trimesh.Trimesh(np.eye(3), [[0, 1, 2]], vertex_normals=normals, process=False)).mesh
+    def test_a_trimesh_looks_the_same_whoever_has_looked_at_it(self) -> None:
+        """trimesh keeps normals that it merely computed where it keeps those it was given, so neither is taken."""
+        box = trimesh.creation.box()
+        before = Object(mesh=box).mesh
+        assert box.vertex_normals.shape == (8, 3)
+        after = Object(mesh=box).mesh
+        assert isinstance(before, Mesh)
+        assert isinstance(after, Mesh)
+        assert before.digest == after.digest
+
+    def test_the_face_colours_of_a_trimesh(self) -> None:
+        box = trimesh.creation.box()
+        box.visual.face_colors = np.tile(np.uint8([255, 0, 0, 255]), (12, 1))
+        mesh = Object(mesh=box).mesh
         assert isinstance(mesh, Mesh)
-        assert mesh.normals == pytest.approx(normals)
+        assert len(mesh.triangles) == 12
+        assert mesh.colours == pytest.approx(np.tile([1.0, 0, 0, 1], (36, 1)))
 
     @pytest.mark.parametrize(
         ("mesh", "message"),
