@@ -109,7 +109,7 @@ FALLOFF_POWERS: dict[Falloff, int] = {"none": 0, "1/r": 1, "1/r^2": 2}
 
 
 def least_distance(strength: float, falloff: Falloff) -> float:
-    """The r_min [scene units] below which light of that strength would exceed BRIGHTEST: 2e-19 for 1/r^2 and a strength of 4."""
+    """The r_min [scene units] below which light of that strength exceeds BRIGHTEST: 2e-19 for 1/r^2 and a strength of 4."""
     power = FALLOFF_POWERS[falloff]
     # 4e-38 is the least: a normal number, as is its inverse.
     return (max(strength, 4.0) / BRIGHTEST) ** (1 / power) if power else 0.0

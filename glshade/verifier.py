@@ -220,23 +220,24 @@ def verify(
     picture: Any = None,
     renderer: Any = None,
     mask: Flags | None = None,
-    driver: Driver = LLVMPIPE,
+    driver: Driver | None = None,
 ) -> Verdict:
     """Whether the GPU's picture of the scene, linear and with one sample a pixel, is right, pixel by pixel.
 
     picture: (H, W, 3 or 4), judged in place of the GPU's. renderer: a Renderer to draw with, in place of a new one on backend
-    and device. mask (H, W): pixels to leave out; they count as ambiguous. max_ambiguous: the budget's share.
+    and device. mask (H, W): pixels to leave out; they count as ambiguous. max_ambiguous: the budget's share. driver: what is
+    known of its fixed functions; left out: by GL_RENDERER.
     Errors: SceneError, ShaderError, ContextError, GlshadeError where picture has another size.
     """
     from time import perf_counter
 
     scene = single_sample(scene)
     start = perf_counter()
-    made_by = "picture given"
+    made_by = ""
     if picture is None:
         picture, made_by = _drawn(scene, shading, renderer, backend, device)
     drawn = perf_counter()
-    expected = candidates(scene, shading=shading, driver=driver)
+    expected = candidates(scene, shading=shading, driver=driver or reference.driver_of(made_by))
     judged = perf_counter()
     result = verdict_of(np.asarray(getattr(picture, "pixels", picture)), expected, mask, max_ambiguous, made_by)
     result.seconds.update({"draw": drawn - start, "reference": judged - drawn, "judge": perf_counter() - judged})
@@ -283,7 +284,7 @@ def verdict_of(
         picture,
         expected.picture[..., :channels].astype(np.float32),
         np.where(mask, PixelClass.MASKED, _map(expected)) if mask is not None else _map(expected),
-        made_by,
+        made_by or "picture given",
         {},
     )
 

@@ -147,7 +147,8 @@ def judge(picture: Array, expected: Expected, mask: Flags | None = None) -> Comp
     low, high, centre = (part[:, :channels] for part in (expected.low, expected.high, expected.centre))
     outside = np.maximum(np.maximum(low - of, of - high), 0).max(axis=1)
     error = np.abs(of - centre)
-    unseen = ((low <= background) & (background <= high)).all(axis=1)
+    unseen = expected.open.copy()
+    unseen[expected.pixel[((low <= background) & (background <= high)).all(axis=1)]] = True
     # Of what is allowed on the side where the value lies.
     room = np.where(of >= centre, high - centre, centre - low)
     share = (error / np.maximum(room, 1e-300)).max(axis=1)
@@ -187,7 +188,7 @@ def judge(picture: Array, expected: Expected, mask: Flags | None = None) -> Comp
         p999=float(np.quantile(interior, 0.999)) if len(interior) else 0.0,
         tolerance=float(allowed[counted].max(initial=0.0)),
         empty=bool((from_background == 0).all()) and not broken.any(),
-        may_be_empty=bool((unseen | expected.open[expected.pixel]).all()),
+        may_be_empty=bool(unseen[expected.pixel].all()),
     )
 
 

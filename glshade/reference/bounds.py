@@ -73,6 +73,13 @@ class Driver:
 
 
 LLVMPIPE = Driver()
+# What graphics processors are free to do, where none has been measured: attributes from snapped corners, 8-bit filter weights.
+HARDWARE = Driver("hardware", snap=1 / SUBPIXELS, level=0.1, texel=1 / 256)
+
+
+def driver_of(renderer: str) -> Driver:
+    """The record for a GL_RENDERER string."""
+    return LLVMPIPE if "llvmpipe" in renderer.lower() or not renderer else HARDWARE
 
 
 @dataclass(frozen=True, eq=False)
