@@ -364,9 +364,20 @@ def _settled(inputs: Inputs, fragments: Fragments, slack: Array, driver: Driver)
     partial = fragments.partial | uncertain
     sealed = np.zeros(len(fragments), dtype=np.bool_)
     which = np.flatnonzero(fragments.partial & ~uncertain)
-    if len(which):
-        sealed[which] = reference.sealed(inputs, fragments.take(which))
-    return _Pieces(fragments, slack, partial, sealed)
+    if not len(which):
+        return _Pieces(fragments, slack, partial, sealed)
+    sealed[which] = reference.sealed(inputs, fragments.take(which))
+    pieces = _Pieces(fragments, slack, partial, sealed)
+    turned = which[reference.turnable(inputs, fragments.take(which))]
+    if not len(turned):
+        return pieces
+    other = replace(fragments.take(turned), front=~fragments.front[turned])
+    return _Pieces(
+        Fragments.joined([fragments, other]),
+        np.concatenate([slack, slack[turned]]),
+        np.concatenate([partial, partial[turned]]),
+        np.concatenate([sealed, sealed[turned]]),
+    )
 
 
 def _compose(

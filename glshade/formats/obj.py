@@ -11,7 +11,7 @@ import numpy as np
 from glshade.formats import mtl
 from glshade.formats.colours import srgb_to_linear, with_alpha
 from glshade.formats.contents import Material
-from glshade.formats.file import File
+from glshade.formats.file import File, text_of
 from glshade.formats.parser import parse, triangles
 from glshade.formats.polygon import triangulated
 from glshade.mesh import Float64
@@ -87,14 +87,6 @@ def read(file: File) -> None:
             colours=colours,
         )
         file.contents.add(title, mesh, materials.get(material) if material else None)
-
-
-def text_of(data: bytes) -> str:
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")
-    return text.replace("\r\n", "\n").replace("\r", "\n")
 
 
 def _corners(file: File, number: int, corners: str, attributes: dict[str, list[str]]) -> Iterator[tuple[str, str]]:

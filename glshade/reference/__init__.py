@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.image import Image
-from glshade.reference.bounds import LLVMPIPE, Bounds, Driver, alphas, bounds, depth_slack, driver_of, sealed
+from glshade.reference.bounds import LLVMPIPE, Bounds, Driver, alphas, bounds, depth_slack, driver_of, sealed, turnable
 from glshade.reference.inputs import Draw, Inputs, prepare
 from glshade.reference.raster import MARGIN, Fragments, rasterise, resolve
 from glshade.reference.shade import AT_CENTRE, Sampling, is_there, opacity, shade
@@ -39,6 +39,7 @@ __all__ = [
     "resolve",
     "sealed",
     "shade",
+    "turnable",
 ]
 
 

@@ -51,8 +51,8 @@ LEVELS = 9
 SHIFTS = 5
 # An edge is near a pixel's centre within this [pixels]: the margin of coverage, and the steps that its corners are snapped by.
 NEAR = (MARGIN + 2) / SUBPIXELS
-# Slimmer (L^2 over twice the area) a triangle may turn over when its corners are snapped.
-THIN = 1e4
+# Lower than this [pixels] a triangle may turn over when its corners are snapped, by half a step each, or a whole one.
+FLAT = 4 / SUBPIXELS
 
 
 @dataclass(frozen=True)
@@ -169,6 +169,16 @@ def bounds(inputs: Inputs, fragments: Fragments, driver: Driver = LLVMPIPE) -> B
     return result
 
 
+def turnable(inputs: Inputs, fragments: Fragments) -> NDArray[np.bool_]:
+    """(N,): which fragments may show either side, since their triangle is no higher than a step or two."""
+    result = np.zeros(len(fragments), dtype=np.bool_)
+    for draw, which, some in by_draw(inputs, fragments):
+        if draw.instance.back_faces:
+            planes = _Planes(draw, some, inputs.size, LLVMPIPE)
+            result[which] = planes.thin[planes.place]
+    return result
+
+
 def sealed(inputs: Inputs, fragments: Fragments) -> NDArray[np.bool_]:
     """(N,): which partial fragments belong to a surface that closes the pixel's neighbourhood among them.
 
@@ -186,7 +196,7 @@ def sealed(inputs: Inputs, fragments: Fragments) -> NDArray[np.bool_]:
         opposite = planes.G[planes.place]
         steepness = np.hypot(opposite[..., 0], opposite[..., 1])
         near = np.abs(np.einsum("nij,nj->ni", opposite, planes.at)) <= NEAR * steepness
-        alive[which] = near.any(axis=1) & ~planes.flat & (planes.slim < THIN)[planes.place]
+        alive[which] = near.any(axis=1) & ~planes.flat & ~planes.thin[planes.place]
         vertices, place = np.unique(planes.corners, return_inverse=True)
         # Vertices at one place are one, whatever else they carry.
         _, place_id = np.unique(draw.instance.mesh.positions[vertices] + 0.0, axis=0, return_inverse=True)
@@ -254,10 +264,12 @@ class _Planes:
             window = rows[..., :2] / w[..., None]
             sides = window[:, [1, 2, 0]] - window
             double = np.abs(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0])
-            slim = (sides**2).sum(axis=2).max(axis=1) / double
+            longest = (sides**2).sum(axis=2).max(axis=1)
+            slim = longest / double
+            thin = double <= FLAT * np.sqrt(longest)
             self.over_w = 1 / w
         self.slim = np.where(behind | ~np.isfinite(slim), 1.0, slim)
-        self.behind = behind
+        self.behind, self.thin = behind, thin & ~behind
 
     def errors(self, corners: Array, vertex: Array | float) -> Array:
         """(N, C): of attributes with the values `corners` (T, 3, C), known to `vertex` (T, 3, C) there."""

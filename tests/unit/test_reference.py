@@ -345,10 +345,10 @@ def test_footprint_is_that_of_finite_differences(tmp_path: Path) -> None:
     }
     inputs = reference.prepare(scene(item, [AMBIENT], AHEAD, (24, 24)))
     found = Fragments.joined(reference.rasterise(inputs))
-    from glshade.reference.shade import Sampling, _surface
+    from glshade.reference.shade import Sampling, surface_at
 
     def uv(offset: tuple[float, float]) -> Any:
-        return _surface(inputs.draws[0], found, inputs.size, Sampling(offset=offset))
+        return surface_at(inputs.draws[0], found, inputs.size, Sampling(offset=offset))
 
     h = 1e-5
     middle = uv((0, 0))
