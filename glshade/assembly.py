@@ -5,8 +5,9 @@ Both renderers start here. Nothing is rounded yet but the meshes, which are floa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, Literal
@@ -106,7 +107,34 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
         instances.append(Instance(name, ready, local, material, rate, back_faces, colours, chosen))
     if problems:
         raise SceneError(problems)
-    return Assembly(tuple(instances), tuple(lights), view)
+    return _in_range(Assembly(tuple(instances), tuple(lights), view), np.concatenate(boxes))
+
+
+# Within these the squares of lengths stay well inside float32; scenes beyond are drawn in another unit of length.
+SMALLEST, LARGEST = 1e-12, 1e12
+
+
+def _in_range(assembly: Assembly, corners: Array) -> Assembly:
+    """The assembly, or the same picture at a size whose squares float32 can hold: all lengths times a power of two."""
+    view = assembly.view
+    reach = float(np.abs(corners - view.eye).max())
+    if reach == 0 or SMALLEST <= reach <= LARGEST:
+        return assembly
+    unit = 2.0 ** -round(math.log2(reach))
+    grow = np.diag([unit, unit, unit, 1.0])
+    across = 1.0 if view.perspective else unit
+    return Assembly(
+        tuple(replace(i, world_from_object=grow @ i.world_from_object) for i in assembly.instances),
+        tuple(light.scaled(unit) for light in assembly.lights),
+        replace(
+            view,
+            eye=view.eye * unit,
+            near=view.near * unit,
+            far=view.far * unit,
+            half_width=view.half_width * across,
+            half_height=view.half_height * across,
+        ),
+    )
 
 
 def rig(view: View) -> tuple[Light, ...]:

@@ -37,6 +37,10 @@ class Light(Document):
         values = cls.model_validate(anywhere).uniforms(np.zeros(3))
         return {name: "vec3" if np.size(value) == 3 else "float" for name, value in values.items()}
 
+    def scaled(self, unit: float) -> "Light":
+        """The light of the same picture with all lengths times `unit`."""
+        return self
+
     def uniforms(self, eye: Array) -> dict[str, Any]:
         """The GLSL struct's fields in their order, float64; positions relative to `eye` (3,)."""
         return {"intensity": np.multiply(self.colour, self.intensity)}
@@ -53,6 +57,17 @@ class Placed(Light):
     position: tuple[Finite, Finite, Finite] = Field(description="where it is [scene units]")
     falloff: Falloff = Field("1/r^2", description="how it weakens with distance: none, 1/r, or the physical 1/r^2")
     r_min: Annotated[float, Field(gt=0)] = Field(1e-3, description="within this distance it grows no brighter [scene units]")
+
+    def scaled(self, unit: float) -> Light:
+        # What falls off by a power of the distance shines stronger by that power.
+        gain = {"none": 1.0, "1/r": unit, "1/r^2": unit * unit}[self.falloff]
+        return self.model_copy(
+            update={
+                "position": tuple(c * unit for c in self.position),
+                "r_min": self.r_min * unit,
+                "intensity": self.intensity * gain,
+            }
+        )
 
     def uniforms(self, eye: Array) -> dict[str, Any]:
         return {**super().uniforms(eye), "r_min": self.r_min, "position": np.subtract(self.position, eye)}

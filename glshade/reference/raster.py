@@ -243,7 +243,9 @@ class _Edges:
         covered = np.all((distance > 0) | ((distance == 0) & self.owns[polygon]), axis=1)
         slack = self.slack[polygon]
         near = np.all(distance >= -slack, axis=1)
-        full = np.all((distance > slack) | ~self.real[polygon], axis=1)
+        # A polygon whose corners all come to lie on one point has no edge to be far from, and no inside either.
+        real = self.real[polygon]
+        full = np.all((distance > slack) | ~real, axis=1) & real.any(axis=1)
         return covered, np.logical_and(near, ~full)
 
 
