@@ -13,6 +13,9 @@ import click
 from glshade import __version__
 from glshade.errors import GlshadeError
 
+# pydantic would read the metadata of every installed package, to look for plug-ins of its own: 20 to 50 ms.
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
+
 COMMANDS = tuple(sorted(path.stem for path in Path(__file__).parent.glob("*.py") if not path.stem.startswith("_")))
 INTERRUPTED = 130
 
