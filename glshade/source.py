@@ -142,10 +142,13 @@ def _wanted(plan: ProgramPlan) -> list[str]:
 
 
 def _varyings(plan: ProgramPlan, direction: str) -> str:
+    return "".join(f"{_varying(name, direction)}\n" for name in _handed_on(plan))
+
+
+def _handed_on(plan: ProgramPlan) -> list[str]:
+    """What passes from the vertex to the fragment stage under phong: what the shading wants, and what alpha does."""
     names = _wanted(plan)
-    if plan.alpha_from and "uv" not in names:
-        names.append("uv")
-    return "".join(f"{_varying(name, direction)}\n" for name in names)
+    return [*names, "uv"] if plan.alpha_from and "uv" not in names else names
 
 
 def _varying(name: str, direction: str) -> str:
@@ -166,9 +169,7 @@ def _transforms(plan: ProgramPlan) -> str:
 
 def _interpolated(plan: ProgramPlan) -> str:
     """The vertex stage under phong: hands on what the fragment stage asks for."""
-    names = _wanted(plan)
-    if plan.alpha_from and "uv" not in names:
-        names.append("uv")
+    names = _handed_on(plan)
     values = {
         "position": "world(a_position)",
         "normal": "world_normal(a_normal)",

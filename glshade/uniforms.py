@@ -7,7 +7,6 @@ that the two renderers share their inputs and nothing else.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from types import SimpleNamespace
 from typing import Any
 
@@ -18,7 +17,6 @@ from glshade.assembly import Assembly, Instance
 from glshade.brdfs import Brdf
 from glshade.lights import LIGHTS, Falloff, Light
 from glshade.plan import LightGroup, ProgramPlan
-from glshade.texture import Texture
 
 Array = NDArray[np.float64]
 Values = dict[str, NDArray[np.float32]]
@@ -64,7 +62,7 @@ def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
 
 def textures(plan: ProgramPlan, material: Any) -> dict[str, Any]:
     """sampler name -> Texture or NormalMap."""
-    found = {}
+    found: dict[str, Any] = {}
     for name in plan.textured:
         texture = getattr(material, name)
         if texture.encoding == "auto" and not type(material).is_colour(name):
@@ -75,7 +73,7 @@ def textures(plan: ProgramPlan, material: Any) -> dict[str, Any]:
         found[f"u_{plan.alpha_from}_texture"] = getattr(material, plan.alpha_from)
     if plan.normal_map:
         found["u_normal_map"] = material.normal_map
-    return {name: value for name, value in found.items() if isinstance(value, Texture) or name == "u_normal_map"}
+    return found
 
 
 def normal_matrix(linear: Array) -> Array:
@@ -113,16 +111,6 @@ def least_distance(strength: float, falloff: Falloff) -> float:
     power = FALLOFF_POWERS[falloff]
     # 4e-38 is the least: a normal number, as is its inverse.
     return (max(strength, 4.0) / BRIGHTEST) ** (1 / power) if power else 0.0
-
-
-def grouped(assembly: Assembly, chosen: tuple[int, ...]) -> Mapping[tuple[str, str], list[Light]]:
-    """(type, falloff) -> lights, of the chosen that have a direction."""
-    groups: dict[tuple[str, str], list[Light]] = {}
-    for index in chosen:
-        light = assembly.lights[index]
-        if not light.omnidirectional:
-            groups.setdefault((light.type, getattr(light, "falloff", "none")), []).append(light)
-    return groups
 
 
 def ambient_intensity(assembly: Assembly, chosen: tuple[int, ...], exposure: float) -> Array:

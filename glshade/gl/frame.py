@@ -53,12 +53,6 @@ class Frame:
         self.resolve()
         self._resolved.read_into(out, components=4, alignment=1, dtype=DTYPES[self.storage][0])
 
-    def release(self) -> None:
-        """Gives it back to the driver."""
-        for item in (self.target, self._resolved, self._colour, self._depth, self.texture):
-            if item is not None:
-                item.release()
-
 
 def _make_float(context: Context, renderbuffer: int, size: tuple[int, int], samples: int) -> None:
     """Gives a depth renderbuffer 32-bit float storage, where reversed depth has its digits; moderngl makes 24-bit ones."""

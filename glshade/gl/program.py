@@ -65,10 +65,6 @@ class Program:
         if member is not None:
             member.value = value
 
-    def release(self) -> None:
-        """Gives it back to the driver."""
-        self.gl.release()
-
 
 def _explain(message: str, source: Source) -> list[str]:
     """moderngl names the stage in its heading: `vertex_shader` or `fragment_shader`."""

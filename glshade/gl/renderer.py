@@ -32,7 +32,6 @@ from glshade.source import PAGE, Source, expand, generate
 from glshade.uniforms import (
     Values,
     ambient_radiance,
-    grouped,
     light_pages,
     light_uniforms,
     object_uniforms,
@@ -319,10 +318,9 @@ class Renderer:
     def _pages(
         self, plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...], exposure: float
     ) -> list[list[tuple[str, moderngl.Buffer, int]]]:
-        groups = grouped(assembly, chosen)
         result = []
         for group in _paged(plan):
-            lights = groups[group.type, group.falloff]
+            lights = [assembly.lights[i] for i in chosen if group.holds(assembly.lights[i])]
             records = light_pages(group, lights, assembly.view.eye, exposure, PAGE)
             whole = PAGE * records[0].dtype.itemsize
             result.append([(group.key, self.context.gl.buffer(r.tobytes().ljust(whole, b"\0")), len(r)) for r in records])
