@@ -99,7 +99,7 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
         rate = shading or item.shading
         problems.extend(f"{name}: {problem}" for problem in _needs_uvs(mesh, material))
         back_faces = _draws_back_faces(item, mesh, material, world, box, view)
-        tangents = BRDFS[material.brdf].anisotropic or material.normal_map is not None
+        tangents = material.needs_tangents or material.normal_map is not None
         ready = _ready(mesh, rate == "flat", item.normals, item.threshold, tangents)
         local = world.copy()
         local[:3, 3] += world[:3, :3] @ mesh.origin

@@ -6,6 +6,7 @@ they are uniforms; what changes the text of a program is.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from dataclasses import dataclass
 from typing import Literal
@@ -64,12 +65,14 @@ class LightGroup:
 class ProgramPlan:
     """What one program holds.
 
-    parameters: (name, use) in the struct's order; use may also be the name of the parameter it equals. alpha_from: the
-    parameter whose texture carries alpha. ambient: constant where it adds the same colour everywhere.
+    slots: (place, GLSL) that the model's file leaves to the material. parameters: (name, use) in the struct's order; use may
+    also be the name of the parameter it equals. alpha_from: the parameter whose texture carries alpha. ambient: constant
+    where it adds the same colour everywhere.
     """
 
     rate: Rate
     brdf: str
+    slots: tuple[tuple[str, str], ...]
     parameters: tuple[tuple[str, str], ...]
     lights: tuple[LightGroup, ...]
     ambient: Literal["none", "constant", "varying"]
@@ -79,6 +82,7 @@ class ProgramPlan:
     alpha_from: str | None
     vertex_colours: bool
     normal_map: bool
+    anisotropic: bool
     encoding: Literal["linear", "srgb"]
 
     @property
@@ -95,7 +99,7 @@ class ProgramPlan:
     @property
     def tangents(self) -> bool:
         """Whether the shading frame needs tangents."""
-        return self.directed and (self.normal_map or BRDFS[self.brdf].anisotropic)
+        return self.directed and (self.normal_map or self.anisotropic)
 
     @property
     def textured(self) -> tuple[str, ...]:
@@ -107,11 +111,15 @@ class ProgramPlan:
         extras = [f"{name} textured" for name in self.textured]
         extras += ["normal map"] * self.normal_map + ["vertex colours"] * self.vertex_colours
         extras += ["both sides"] * self.both_sides + [f"alpha {self.alpha}"] * (self.alpha != "opaque")
+        parts = [name for _, text in self.slots for name in _INCLUDED.findall(text)]
+        model = self.brdf + f" ({', '.join(parts)})" * bool(parts)
         return ", ".join(
-            [f"{self.brdf} per {PER[self.rate]}", " + ".join(lights) or "no light", self.viewer, *extras, self.encoding]
+            [f"{model} per {PER[self.rate]}", " + ".join(lights) or "no light", self.viewer, *extras, self.encoding]
         )
 
 
+# What a slot includes, by its file's name.
+_INCLUDED = re.compile(r'^#include ".*?(\w+)\.glsl"', re.MULTILINE)
 PER = {"flat": "face", "gouraud": "vertex", "phong": "pixel"}
 
 
@@ -141,7 +149,7 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
     material = instance.material
     model = BRDFS[material.brdf]
     # A model that answers only to ambient light never asks for another.
-    if not model.asked_for("light"):
+    if not material.asked("light"):
         kinds.clear()
     groups = []
     for (name, falloff), count in sorted(kinds.items()):
@@ -153,8 +161,8 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
     # Where no texture takes part, ambient light adds one colour, which is worked out beforehand.
     varies = instance.vertex_colours or any(isinstance(getattr(material, name), Texture) for name in model.parameters())
     how: Literal["none", "constant", "varying"] = "none" if not ambient else "varying" if varies else "constant"
-    asked = model.asked_for("light") if groups else frozenset()
-    asked |= model.asked_for("ambient") if how == "varying" else frozenset()
+    asked = material.asked("light") if groups else frozenset()
+    asked |= material.asked("ambient") if how == "varying" else frozenset()
     asked |= {model.parameters()[name].same_as or name for name in asked if getattr(material, name) is None}
     parameters = []
     for name, declared in model.parameters().items():
@@ -172,6 +180,7 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
     return ProgramPlan(
         rate=instance.rate,
         brdf=material.brdf,
+        slots=tuple(material.slots().items()) if groups or how == "varying" else (),
         parameters=tuple(parameters),
         lights=tuple(groups),
         ambient=how,
@@ -181,6 +190,7 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         alpha_from=base if carries_alpha else None,
         vertex_colours=instance.vertex_colours and (bool(groups) or ambient or material.alpha_mode != "opaque"),
         normal_map=material.normal_map is not None and bool(groups),
+        anisotropic=material.needs_tangents and bool(groups),
         encoding=encoding,
     )
 

@@ -93,12 +93,13 @@ def expand(name: str, generated: Mapping[str, str], root: Path | None = None) ->
 def generate(plan: ProgramPlan) -> Source:
     """The text of the program that `plan` describes. The same plan gives the same text."""
     name = plan.rate + ("_both" if plan.both_sides else "")
+    slots = dict(plan.slots)
     if plan.rate == "phong":
         vertex = {"surface": _interpolated(plan)}
-        fragment = {"surface": _shading(plan, _Interpolated(plan)) + _alpha(plan)}
+        fragment = {**slots, "surface": _shading(plan, _Interpolated(plan)) + _alpha(plan)}
         vertex_pass, fragment_pass = "phong.vert", f"{name}.frag"
     else:
-        vertex = {"surface": _shading(plan, _AtVertex(plan)) + _alpha_inputs(plan, "out")}
+        vertex = {**slots, "surface": _shading(plan, _AtVertex(plan)) + _alpha_inputs(plan, "out")}
         fragment = {"surface": _alpha_inputs(plan, "in") + _alpha(plan)}
         vertex_pass = f"{name}.vert"
         fragment_pass = f"{name}.frag" if plan.rate == "gouraud" else "flat.frag"

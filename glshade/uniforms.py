@@ -17,6 +17,7 @@ from glshade.assembly import Assembly, Instance
 from glshade.brdfs import Brdf
 from glshade.lights import LIGHTS, Falloff, Light
 from glshade.plan import LightGroup, ProgramPlan
+from glshade.texture import Texture
 
 Array = NDArray[np.float64]
 Values = dict[str, NDArray[np.float32]]
@@ -127,7 +128,7 @@ def ambient_radiance(instance: Instance, assembly: Assembly, exposure: float) ->
     """What ambient light adds to a surface of one colour."""
     model = type(instance.material)
     values = {name: np.asarray(value, dtype=np.float64) for name, value in parameter_values(instance.material).items()}
-    reflectance = model.ambient_reflectance(SimpleNamespace(**values))
+    reflectance = model.ambient_reflectance(SimpleNamespace(**values, **instance.material.chosen()))
     return {"u_ambient_radiance": rounded(reflectance * ambient_intensity(assembly, instance.lights, exposure))}
 
 
@@ -137,6 +138,20 @@ def parameter_values(material: Brdf) -> dict[str, Any]:
     return {
         name: getattr(material, same_as) if value is None and same_as else value for name, (value, same_as) in values.items()
     }
+
+
+def numbers(brdf: Brdf) -> Values:
+    """name -> value of a material without textures, as the GPU gets it. Errors: ValueError for a texture."""
+    values = parameter_values(brdf)
+    for name, value in values.items():
+        if isinstance(value, Texture):
+            raise ValueError(f"{name} is a texture where a number is needed")
+    return {name: rounded(value) for name, value in values.items()}
+
+
+def widened(brdf: Brdf) -> SimpleNamespace:
+    """The same numbers in float64, with the choices: what `Brdf.brdf_cos` takes. Errors: ValueError for a texture."""
+    return SimpleNamespace(**{name: value.astype(np.float64) for name, value in numbers(brdf).items()}, **brdf.chosen())
 
 
 def light_uniforms(plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...], exposure: float) -> Values:

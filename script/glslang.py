@@ -23,6 +23,9 @@ from glshade.scene_file import load
 from glshade.source import Source, expand, generate
 
 ROOT = Path(__file__).parent.parent
+sys.path.insert(0, str(ROOT / "tests"))
+
+from extremes import at_extremes  # noqa: E402
 
 
 def groups(count: int) -> tuple[LightGroup, ...]:
@@ -43,9 +46,22 @@ def plans() -> Iterator[ProgramPlan]:
         unused = tuple((p, "unused") for p in model.parameters())
         textured = parameters[0][0] if use == "texture" else None
         base = ProgramPlan(
-            "phong", name, parameters, groups(1), "varying", "perspective", False, "opaque", None, False, False, "srgb"
+            rate="phong",
+            brdf=name,
+            slots=tuple(model().slots().items()),
+            parameters=parameters,
+            lights=groups(1),
+            ambient="varying",
+            viewer="perspective",
+            both_sides=False,
+            alpha="opaque",
+            alpha_from=None,
+            vertex_colours=False,
+            normal_map=False,
+            anisotropic=model.anisotropic,
+            encoding="srgb",
         )
-        yield base
+        yield from (replace(base, slots=tuple(material.slots().items())) for material in at_extremes(name, 48))
         for rate, viewer, both in itertools.product(rates, viewers, (False, True)):
             one = replace(base, rate=rate, viewer=viewer, both_sides=both, encoding="linear")
             yield from (replace(one, lights=groups(count)) for count in (0, 1, 3))
@@ -67,9 +83,9 @@ def sources() -> Iterator[Source]:
     for encoding in ("linear", "srgb"):
         output = {"output": f'#include "output/{encoding}.glsl"\n'}
         yield Source(expand("pass/picture.vert", {}), expand("pass/picture.frag", output))
-    for model in BRDFS.values():
-        text = generated(model())
-        yield Source(expand("pass/evaluate.vert", text), expand("pass/evaluate.frag", text))
+    for name in BRDFS:
+        for text in {tuple(generated(material).items()): generated(material) for material in at_extremes(name, 48)}.values():
+            yield Source(expand("pass/evaluate.vert", text), expand("pass/evaluate.frag", text))
 
 
 def main() -> int:

@@ -11,7 +11,7 @@ import itertools
 import math
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +60,8 @@ def at_extremes(name: str, most: int) -> list[Brdf]:
         high = declared[key].high
         # Not grey, so that a channel taken for another is found out.
         bright[key] = tuple(x * (1.0 if high is None else high) for x in (1.0, 0.75, 0.5))
-    found = [model(**bright), model(**{key: declared[key].low for key in bright})]
+    found = [model(**bright, **chosen) for chosen in choices(model)]
+    found += [model(**{key: declared[key].low for key in bright})]
     found += [model(**{**bright, key: declared[key].low}) for key in bright]
     found += [model(**bright, **{key: x}) for key, places in scalars.items() for x in places]
     if len(scalars) <= 4:
@@ -72,8 +73,15 @@ def at_extremes(name: str, most: int) -> list[Brdf]:
     if len(scalars) > 1:
         combinations = math.prod(map(len, scalars.values()))
         for _ in range(min(most, combinations) - len(found)):
-            found.append(model(**bright, **{key: float(random.choice(places)) for key, places in scalars.items()}))
+            values = {key: float(random.choice(places)) for key, places in scalars.items()}
+            found.append(model(**bright, **values, **choices(model)[random.integers(len(choices(model)))]))
     return found
+
+
+def choices(model: type[Brdf]) -> list[dict[str, str]]:
+    """Every combination of the model's options."""
+    options = [[(key, value) for value in get_args(model.model_fields[key].annotation)] for key in model.choices()]
+    return [dict(chosen) for chosen in itertools.product(*options)]
 
 
 def ordinary(name: str, count: int) -> list[Brdf]:
@@ -87,7 +95,7 @@ def ordinary(name: str, count: int) -> list[Brdf]:
             share = random.uniform(size=3)
             x = low * (high / low) ** share if low > 0 and high > 10 * low else low + (high - low) * share
             values[key] = tuple(map(float, x)) if model.is_colour(key) else float(x[0])
-        found.append(model(**values))
+        found.append(model(**values, **choices(model)[random.integers(len(choices(model)))]))
     return found
 
 
@@ -171,7 +179,7 @@ def exact(material: Brdf, l: Any, v: Any, tilt: float = TILT) -> tuple[Array, Ar
     parameters = {name: rounded(x).astype(np.float64) for name, x in parameter_values(material).items()}
 
     def f(l: Array, v: Array, given: dict[str, Array]) -> Array:
-        value: Array = type(material).brdf_cos(SimpleNamespace(**given), l, v)
+        value: Array = type(material).brdf_cos(SimpleNamespace(**given, **material.chosen()), l, v)
         return np.broadcast_to(value, l.shape)
 
     l, v = np.asarray(l, dtype=np.float64), np.asarray(v, dtype=np.float64)

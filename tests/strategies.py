@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 from hypothesis import strategies as st
@@ -35,6 +35,7 @@ def materials(name: str, **fixed: Any) -> st.SearchStrategy[Brdf]:
     """Materials of one model, at ordinary parameters. `fixed` overrides."""
     model = BRDFS[name]
     chosen = {key: values(model, key, declared) for key, declared in model.parameters().items() if key not in fixed}
+    chosen |= {key: st.sampled_from(get_args(model.model_fields[key].annotation)) for key in model.choices()}
     return st.fixed_dictionaries(chosen).map(lambda parameters: model(**{**parameters, **fixed}))
 
 

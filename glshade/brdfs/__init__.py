@@ -56,6 +56,25 @@ def parameter(default: Any, declared: Parameter) -> Any:
     )
 
 
+def choice(default: str, description: str) -> Any:
+    """A pydantic field for an option that changes a program's text and is no number: a Literal of names."""
+    return Field(default, description=description, json_schema_extra={"glshade_choice": True})
+
+
+# What a model promises unless it says otherwise: f(l, v) = f(v, l); no more light leaves than arrives.
+Law = Literal["reciprocity", "energy"]
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Two materials that are the same function of directions, and how it is said. within: relative, in float64."""
+
+    says: str
+    one: "Brdf"
+    other: "Brdf"
+    within: float = 1e-9
+
+
 class Brdf(Document):
     """A material: a model's parameters, and what every material may say of its surface besides."""
 
@@ -69,10 +88,26 @@ class Brdf(Document):
     normal_map: NormalMap | None = Field(None, description="tangent-space normals")
     sides: Literal["auto", "front", "both"] = Field("auto", description="sides of the surface; an object may say otherwise")
 
-    # Whether the model looks at the tangent directions.
-    anisotropic: ClassVar[bool] = False
     # Paper, year and equations.
     source: ClassVar[str] = ""
+    # Laws that the model does not keep, and why.
+    breaks: ClassVar[Mapping[Law, str]] = {}
+    # Reflectances that share one budget: the law of energy is promised where their sum is at most 1.
+    shares: ClassVar[tuple[str, ...]] = ()
+    # Of a model that looks at the tangent directions: what to set, to another parameter's value or a number, so that nothing
+    # hangs on them.
+    isotropic_where: ClassVar[Mapping[str, str | float]] = {}
+    # Whether the model looks at the tangent directions.
+    anisotropic: ClassVar[bool] = False
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_: Any) -> None:
+        cls.anisotropic = bool(cls.isotropic_where)
+
+    @classmethod
+    def limits(cls) -> tuple[Limit, ...]:
+        """The simpler models that this one becomes."""
+        return ()
 
     @classmethod
     @cache
@@ -87,9 +122,33 @@ class Brdf(Document):
 
     @classmethod
     @cache
-    def asked_for(cls, by: Literal["light", "ambient"]) -> frozenset[str]:
-        """The parameters that light from a direction, or ambient light, asks for: seen by running the model once."""
-        asked = _Asked(cls)
+    def choices(cls) -> tuple[str, ...]:
+        """The names of the options."""
+        extras = {name: field.json_schema_extra for name, field in cls.model_fields.items()}
+        return tuple(name for name, extra in extras.items() if isinstance(extra, dict) and "glshade_choice" in extra)
+
+    def chosen(self) -> dict[str, str]:
+        """option -> choice."""
+        return {name: getattr(self, name) for name in self.choices()}
+
+    def slots(self) -> dict[str, str]:
+        """GLSL for the places that the model's file names in angle brackets. What this material does not need is not in it."""
+        return {}
+
+    @property
+    def needs_tangents(self) -> bool:
+        """Whether this material looks at the tangent directions."""
+        return self.anisotropic
+
+    def asked(self, by: Literal["light", "ambient"]) -> frozenset[str]:
+        """The parameters that light from a direction, or ambient light, asks for."""
+        return self._traced(by, tuple(self.chosen().items()))
+
+    @classmethod
+    @cache
+    def _traced(cls, by: Literal["light", "ambient"], chosen: tuple[tuple[str, str], ...]) -> frozenset[str]:
+        """Seen by running the model once."""
+        asked = _Asked(cls, dict(chosen))
         up = np.array([[0.0, 0.0, 1.0]])
         if by == "light":
             cls.brdf_cos(asked, up, up)
@@ -135,7 +194,8 @@ class Brdf(Document):
 
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
-        """f cos [1/sr], (..., 3), in float64; `m` has the parameters as arrays, colours (..., 3) and scalars (...).
+        """f cos [1/sr], (..., 3), in float64; `m` has the parameters as arrays, colours (..., 3) and scalars (...), and the
+        choices as strings.
 
         l, v (..., 3): unit directions in the local frame, z along the normal, x along the tangent.
         """
@@ -150,11 +210,13 @@ class Brdf(Document):
 class _Asked:
     """Stands for a material, and notes which parameters are looked at."""
 
-    def __init__(self, model: type[Brdf]) -> None:
+    def __init__(self, model: type[Brdf], chosen: dict[str, str]) -> None:
         self.names: set[str] = set()
-        self._model = model
+        self._model, self._chosen = model, chosen
 
-    def __getattr__(self, name: str) -> Array:
+    def __getattr__(self, name: str) -> Array | str:
+        if name in self._chosen:
+            return self._chosen[name]
         self.names.add(name)
         return np.full((1, 3) if self._model.is_colour(name) else (1,), 0.5)
 

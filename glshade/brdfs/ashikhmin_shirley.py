@@ -16,7 +16,7 @@ class AshikhminShirley(Brdf):
     """
 
     source: ClassVar[str] = "Ashikhmin and Shirley 2000, eqs. 1-5; lecture slides 40-46"
-    anisotropic: ClassVar[bool] = True
+    isotropic_where: ClassVar[dict[str, str | float]] = {"pv": "pu"}
 
     brdf: Literal["ashikhmin_shirley"] = "ashikhmin_shirley"
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("diffuse reflectance", high=1.0, base=True))

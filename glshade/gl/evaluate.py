@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any, Literal
 
 import moderngl
@@ -13,8 +12,7 @@ from glshade.brdfs import BRDFS, Brdf
 from glshade.gl.context import Context, open_context
 from glshade.gl.program import Program
 from glshade.source import Source, expand
-from glshade.texture import Texture
-from glshade.uniforms import parameter_values, rounded
+from glshade.uniforms import numbers, widened
 
 On = Literal["reference", "vertex", "fragment"]
 
@@ -30,10 +28,9 @@ def evaluate(brdf: Brdf, l: ArrayLike, v: ArrayLike, on: On = "reference", conte
     l, v = np.broadcast_arrays(np.asarray(l, dtype=np.float32), np.asarray(v, dtype=np.float32))
     if l.shape[-1:] != (3,):
         raise ValueError(f"l and v must have shape (..., 3), not {l.shape}")
-    values = _numbers(brdf)
+    values = numbers(brdf)
     if on == "reference":
-        wide = SimpleNamespace(**{name: value.astype(np.float64) for name, value in values.items()})
-        result: NDArray[Any] = type(brdf).brdf_cos(wide, l.astype(np.float64), v.astype(np.float64))
+        result: NDArray[Any] = type(brdf).brdf_cos(widened(brdf), l.astype(np.float64), v.astype(np.float64))
         return result
     if on not in ("vertex", "fragment"):
         raise ValueError(f'on must be "reference", "vertex" or "fragment", not {on!r}')
@@ -50,15 +47,6 @@ def evaluate(brdf: Brdf, l: ArrayLike, v: ArrayLike, on: On = "reference", conte
             opened.release()
 
 
-def _numbers(brdf: Brdf) -> dict[str, NDArray[np.float32]]:
-    """name -> float32 value, as the GPU gets it. Errors: ValueError for a texture."""
-    values = parameter_values(brdf)
-    for name, value in values.items():
-        if isinstance(value, Texture):
-            raise ValueError(f"{name} is a texture; evaluate takes numbers")
-    return {name: rounded(value) for name, value in values.items()}
-
-
 def generated(brdf: Brdf) -> dict[str, str]:
     """The model's include, its uniforms, and `value(l, v)`."""
     struct = BRDFS.class_name(brdf.brdf)
@@ -69,7 +57,7 @@ def generated(brdf: Brdf) -> dict[str, str]:
     arguments = ", ".join(f"u_{name}" for name in names)
     frame = "Frame(vec3(0.0, 0.0, 1.0), vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0))"
     text += f"\nvec3 value(vec3 l, vec3 v) {{\n    return brdf_cos({struct}({arguments}), {frame}, l, v);\n}}\n"
-    return {"model": text}
+    return {**brdf.slots(), "model": text}
 
 
 def _in_vertex_stage(

@@ -302,7 +302,7 @@ class Renderer:
             if index:
                 # What is counted exactly, and ambient light, has been drawn with the first page.
                 many = tuple(group for group, of in zip(_paged(plan), pages, strict=True) if index < len(of))
-                here = replace(plan, lights=many, ambient="none", parameters=_without_ambient(plan))
+                here = replace(plan, lights=many, ambient="none", parameters=_without_ambient(plan, instance))
             program = self._program(generate(here))
             values = object_uniforms(here, instance, assembly.view.eye)
             if here.ambient == "constant":
@@ -389,10 +389,8 @@ def _paged(plan: ProgramPlan) -> list[Any]:
     return [group for group in plan.lights if group.count == 0]
 
 
-def _without_ambient(plan: ProgramPlan) -> tuple[tuple[str, str], ...]:
-    from glshade.brdfs import BRDFS
-
-    lit = BRDFS[plan.brdf].asked_for("light")
+def _without_ambient(plan: ProgramPlan, instance: Instance) -> tuple[tuple[str, str], ...]:
+    lit = instance.material.asked("light")
     return tuple((name, use if name in lit else "unused") for name, use in plan.parameters)
 
 

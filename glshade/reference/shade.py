@@ -221,7 +221,7 @@ def material_of(draw: Draw, surface: Surface) -> SimpleNamespace:
         if tinted and surface.colour is not None:
             value = value * surface.colour[:, :3]
         found[name] = value
-    return SimpleNamespace(**found)
+    return SimpleNamespace(**found, **draw.instance.material.chosen())
 
 
 def _stands_for_base(draw: Draw, name: str) -> bool:
