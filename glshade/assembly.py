@@ -23,6 +23,7 @@ from glshade.camera import View
 from glshade.errors import SceneError
 from glshade.lights import LIGHTS, Light
 from glshade.mesh import Mesh, faceted, ordered, with_normals, with_tangents
+from glshade.quality import Quality
 from glshade.scene import Normals, Object, Rate, Scene
 
 Array = NDArray[np.float64]
@@ -38,7 +39,8 @@ class Instance:
 
     name: the object's, for messages. mesh: ready for its rate (faceted for flat), with tangents where they are asked for.
     world_from_object (4, 4) float64, for positions relative to the mesh's own origin. back_faces: whether they are drawn.
-    lights: which of the assembly's reach it.
+    lights: which of the assembly's reach it. quality: the object's and the scene's together; rate and mesh have it in them.
+    number: of the scene's objects, which one.
     """
 
     name: str
@@ -49,6 +51,8 @@ class Instance:
     back_faces: bool
     vertex_colours: bool
     lights: tuple[int, ...]
+    quality: Quality
+    number: int
 
     @cached_property
     def mirrored(self) -> bool:
@@ -73,6 +77,7 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
     problems: list[str] = []
     pieces: list[tuple[Object, str, Mesh, Array, Brdf]] = []
     by_name = {item.name: item for item in scene.objects}
+    numbers = {id(item): index for index, item in enumerate(scene.objects)}
     for index, item in enumerate(scene.objects):
         try:
             pieces.extend(_pieces(scene, by_name, item, item.name or f"objects[{index}]"))
@@ -95,19 +100,26 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
             if (light.only is None or item.name in light.only) and light.intensity != 0 and any(light.colour)
         )
         ambient = any(lights[i].omnidirectional for i in chosen)
-        material = material.canonical(ambient)
-        rate = shading or item.shading
+        quality = item.quality.over(scene.quality) if item.quality else scene.quality
+        material = quality.material(material).canonical(ambient)
+        rate = shading or quality.shading or item.shading
         problems.extend(f"{name}: {problem}" for problem in _needs_uvs(mesh, material))
         back_faces = _draws_back_faces(item, mesh, material, world, box, view)
-        tangents = material.needs_tangents or material.normal_map is not None
-        ready = _ready(mesh, rate == "flat", item.normals, item.threshold, tangents)
+        tangents = material.needs_tangents or material.normal_map is not None or material.bump_map is not None
+        levels = (quality.subdivide or 0) if rate != "phong" else 0
+        ready = _ready(mesh, rate == "flat", item.normals, item.threshold, tangents, levels)
         local = world.copy()
         local[:3, 3] += world[:3, :3] @ mesh.origin
         colours = item.vertex_colours and mesh.colours is not None
-        instances.append(Instance(name, ready, local, material, rate, back_faces, colours, chosen))
+        instances.append(Instance(name, ready, local, material, rate, back_faces, colours, chosen, quality, numbers[id(item)]))
     if problems:
         raise SceneError(problems)
-    return _in_range(Assembly(tuple(instances), tuple(lights), view), np.concatenate(boxes))
+    assembly = _in_range(Assembly(tuple(instances), tuple(lights), view), np.concatenate(boxes))
+    if any(i.rate == "gouraud" and i.quality.refine for i in instances):
+        from glshade.refinement import refined_assembly
+
+        return refined_assembly(scene, assembly)
+    return assembly
 
 
 # Within these the squares of lengths stay well inside float32; scenes beyond are drawn in another unit of length.
@@ -219,7 +231,7 @@ def _draws_back_faces(item: Object, mesh: Mesh, material: Brdf, world: Array, bo
 
 def _needs_uvs(mesh: Mesh, material: Brdf) -> Iterator[str]:
     if mesh.uvs is None:
-        for name in (*material.parameters(), "normal_map"):
+        for name in (*material.parameters(), "normal_map", "bump_map", "tangent_direction"):
             if hasattr(getattr(material, name), "texture"):
                 yield f"its material's {name} is a texture, but its mesh has no texture coordinates"
 
@@ -238,8 +250,12 @@ def _ready(mesh: Mesh, *wishes: Any) -> Mesh:
     return made[wishes] or mesh
 
 
-def _make(mesh: Mesh, flat: bool, normals: Normals, threshold: float, tangents: bool) -> Mesh:
+def _make(mesh: Mesh, flat: bool, normals: Normals, threshold: float, tangents: bool, levels: int) -> Mesh:
     ready = mesh if flat and not tangents else with_normals(mesh, normals, threshold)
     if tangents:
         ready = with_tangents(ready)
+    if levels:
+        from glshade.subdivision import subdivided
+
+        ready = subdivided(ready, levels)
     return ordered(faceted(ready) if flat else ready)

@@ -142,12 +142,12 @@ class Mesh:
                 raise AssetError(f"{name} hold values that are not finite")
         if normals is None:
             return mesh
-        n, length = _normalised(_matrix(normals, 3, "normals"))
+        n, length = normalised(_matrix(normals, 3, "normals"))
         if len(n) != len(p):
             raise AssetError(f"mesh has {len(p)} positions and {len(n)} normals")
         lost = length == 0
         if lost.any():
-            label = _weld(mesh.positions)
+            label = weld(mesh.positions)
             n[lost] = _smooth_by_label(mesh, label[mesh.triangles.reshape(-1)], int(label.max()) + 1)[label[lost]]
         return replace(mesh, normals=n.astype(np.float32))
 
@@ -174,13 +174,13 @@ class Mesh:
         Vertices at exactly equal positions count as one, and triangles with two such corners as none. Every directed
         edge must then occur once, its reverse once, and the signed volume must be positive.
         """
-        place = _weld(self.positions)
+        place = weld(self.positions)
         a, b, c = (place[corner] for corner in self.triangles.astype(np.intp).T)
         flat = (a == b) | (b == c) | (c == a)
         if flat.any():
             a, b, c = a[~flat], b[~flat], c[~flat]
         tail, head = np.concatenate([a, b, c]), np.concatenate([b, c, a])
-        edge = _weld((np.minimum(tail, head) << 32 | np.maximum(tail, head))[:, None])
+        edge = weld((np.minimum(tail, head) << 32 | np.maximum(tail, head))[:, None])
         # As many directions of edges as sides of triangles, and each of them there: then each is there once.
         sides = np.bincount(edge << 1 | (tail < head), minlength=1)
         if len(sides) != len(edge) or not sides.all():
@@ -232,18 +232,18 @@ def with_normals(mesh: Mesh, kind: Literal["auto", "face", "smooth"], threshold:
     if kind == "auto" and mesh.normals is not None:
         return mesh
     if kind == "face":
-        n, length = _normalised(_area_vectors(mesh))
+        n, length = normalised(_area_vectors(mesh))
         n[length == 0] = FALLBACK_NORMAL
         corners = mesh.triangles.reshape(-1)
         return _gather(mesh, corners, np.arange(len(corners)), normals=np.repeat(n, 3, axis=0))
 
-    place = _weld(mesh.positions)
+    place = weld(mesh.positions)
     group, count = _fans(mesh, place, threshold)
     normals = _smooth_by_label(mesh, group, count)
 
     # Vertices that agree in everything but their number are one vertex: an STL file has three for each triangle.
     attributes = [a for a in (mesh.uvs, mesh.colours) if a is not None]
-    vertex = _weld(place[:, None], *attributes) if attributes else place
+    vertex = weld(place[:, None], *attributes) if attributes else place
     corner_vertex = vertex[mesh.triangles.reshape(-1)]
     one = np.empty(count, dtype=np.int64)
     one[group] = corner_vertex
@@ -278,7 +278,7 @@ def with_tangents(mesh: Mesh) -> Mesh:
     area = du1 * dv2 - du2 * dv1
     # dp/du times |area|: only its direction counts, and without the division it is finite for every uv.
     along_u = np.sign(area)[:, None] * (dv2[:, None] * (p[:, 1] - p[:, 0]) - dv1[:, None] * (p[:, 2] - p[:, 0]))
-    along_u = _normalised(along_u)[0]
+    along_u = normalised(along_u)[0]
 
     mirrored = np.repeat(area < 0, 3)
     pairs, label = np.unique(corners.astype(np.int64) << 1 | mirrored, return_inverse=True)
@@ -288,18 +288,18 @@ def with_tangents(mesh: Mesh) -> Mesh:
     w = np.where(pairs & 1, -1.0, 1.0)
     # Summed over vertices equal in all that matters, so that a file without shared vertices gets the same tangents.
     weighted = np.repeat(along_u, 3, axis=0) * _corner_angles(mesh).reshape(-1, 1)
-    alike = _weld(split.positions, split.normals, split.uvs, w[:, None])
+    alike = weld(split.positions, split.normals, split.uvs, w[:, None])
     total = _sum_by_label(weighted, alike[label], int(alike.max()) + 1)[alike]
     # Across a seam of the uvs too, unless the tangents that meet there differ, as at the poles of a sphere.
-    across = _weld(split.positions, split.normals, w[:, None])
+    across = weld(split.positions, split.normals, w[:, None])
     joined = _sum_by_label(weighted, across[label], int(across.max()) + 1)
     lengths = np.bincount(across[label], weights=np.linalg.norm(weighted, axis=1), minlength=len(joined))
     agree = (np.linalg.norm(joined, axis=1) > AGREEING * lengths)[across]
     total[agree] = joined[across[agree]]
     n = split.normals.astype(np.float64)
-    total = _normalised(total)[0]
+    total = normalised(total)[0]
     t = total - n * np.einsum("ij,ij->i", n, total)[:, None]
-    t, length = _normalised(t)
+    t, length = normalised(t)
     # Under 1e-6 the uvs' direction is parallel to the normal, and what is left of it is rounding.
     lost = length < 1e-6
     t[lost], w[lost] = brushed(split.normals[lost]), 1.0
@@ -315,7 +315,7 @@ def brushed(n: npt.ArrayLike) -> Float64:
     t = np.stack([n[..., 2], np.zeros_like(n[..., 0]), -n[..., 0]], axis=-1)
     pole = np.hypot(n[..., 0], n[..., 2]) < POLE
     t[pole] = np.array([1.0, 0.0, 0.0]) - n[pole] * n[pole][..., :1]
-    return _normalised(t)[0]
+    return normalised(t)[0]
 
 
 def faceted(mesh: Mesh) -> Mesh:
@@ -340,7 +340,7 @@ def faceted(mesh: Mesh) -> Mesh:
         n = split.normals.astype(np.float64)
         mean_t = mean(mesh.tangents[:, :3])
         assert mean_t is not None
-        t, length = _normalised(mean_t - n * np.einsum("ij,ij->i", n, mean_t)[:, None])
+        t, length = normalised(mean_t - n * np.einsum("ij,ij->i", n, mean_t)[:, None])
         w = np.repeat(mesh.tangents[mesh.triangles[:, 0], 3], 3)
         lost = length < 1e-6
         t[lost], w[lost] = brushed(n[lost]), 1.0
@@ -445,7 +445,7 @@ def _row(row: Float64) -> str:
     return " ".join(f"{x:g}" for x in row)
 
 
-def _normalised(v: Float64) -> tuple[Float64, Float64]:
+def normalised(v: Float64) -> tuple[Float64, Float64]:
     """Unit vectors (N, 3) along v and their lengths (N,); both 0 where v is zero or not finite.
 
     Scaled by the largest component first: the square of 1e-200 is 0.
@@ -500,7 +500,7 @@ def _corner_angles(mesh: Mesh) -> Float64:
     return angles
 
 
-def _weld(*columns: Array) -> Int64:
+def weld(*columns: Array) -> Int64:
     """(V,) labels from 0 in order of first use, equal where the rows of all given (V, n) arrays are exactly equal.
 
     -0 equals 0. Every row is written into a hash table and looked up again; rows that find another there, because it
@@ -625,7 +625,7 @@ def _smooth_by_label(mesh: Mesh, label: Int64, count: int) -> Float64:
     n = face_normals(mesh)
     angle = _corner_angles(mesh).reshape(-1)
     corner = np.repeat(n, 3, axis=0)
-    result, length = _normalised(_sum_by_label(corner * angle[:, None], label, count))
+    result, length = normalised(_sum_by_label(corner * angle[:, None], label, count))
     # A mean of a few unit vectors that comes out under 1e-7 is rounding of float32 positions.
     lost = length <= 1e-7 * np.bincount(label, weights=angle, minlength=count)
     if lost.any():

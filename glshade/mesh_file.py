@@ -22,7 +22,7 @@ from glshade.formats.contents import EMBEDDED, Contents, Material
 from glshade.mesh import Float64, Mesh
 
 # Raise it when the same file would be read differently: entries of older loaders are then never looked at.
-LOADER_VERSION = 2
+LOADER_VERSION = 3
 
 SUFFIXES = frozenset(formats.READERS)
 

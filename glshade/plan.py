@@ -12,10 +12,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 from glshade.assembly import Assembly, Instance, assemble
-from glshade.brdfs import BRDFS
+from glshade.brdfs import BRDFS, Brdf
 from glshade.lights import Falloff, Light
 from glshade.scene import Rate, Scene
-from glshade.texture import Texture
+from glshade.texels import Texels, texels
+from glshade.texture import DirectionMap, Texture
 
 # A uniform costs time in every pixel on a software driver, so a colour whose three channels are equal is one number.
 
@@ -39,6 +40,12 @@ def kind(light: Light) -> tuple[str, Falloff]:
 EXACT_LIGHTS = 8
 
 Use = Literal["uniform", "grey", "texture", "unused"]
+
+
+def channel(use: str) -> str | None:
+    """Of a use that is a texture's: the channel that a number is read from, "" for a colour's three; None for other uses."""
+    kind, _, which = use.partition(".")
+    return which if kind == "texture" else None
 
 
 @dataclass(frozen=True, order=True)
@@ -66,8 +73,11 @@ class ProgramPlan:
     """What one program holds.
 
     slots: (place, GLSL) that the model's file leaves to the material. parameters: (name, use) in the struct's order; use may
-    also be the name of the parameter it equals. alpha_from: the parameter whose texture carries alpha. ambient: constant
-    where it adds the same colour everywhere.
+    also be the name of the parameter it equals, and names a number's channel: "texture.g". shared: (parameter, the one whose
+    picture it reads too). alpha_from: the parameter whose texture carries alpha. ambient: constant where it adds the same
+    colour everywhere. normal_map: bump maps are normal maps by then; normal_span: how often the unit of texture coordinates
+    goes into its texels. turned: the tangent, by one angle; direction_map: by a picture. normalise: interpolated normals.
+    arithmetic: fast puts textbook forms in place of the stable ones.
     """
 
     rate: Rate
@@ -84,6 +94,12 @@ class ProgramPlan:
     normal_map: bool
     anisotropic: bool
     encoding: Literal["linear", "srgb"]
+    shared: tuple[tuple[str, str], ...] = ()
+    normal_span: tuple[int, int] = (1, 1)
+    turned: bool = False
+    direction_map: bool = False
+    normalise: bool = True
+    arithmetic: Literal["stable", "fast"] = "stable"
 
     @property
     def directed(self) -> bool:
@@ -104,12 +120,25 @@ class ProgramPlan:
     @property
     def textured(self) -> tuple[str, ...]:
         """The parameters that are textures."""
-        return tuple(name for name, use in self.parameters if use == "texture")
+        return tuple(name for name, use in self.parameters if channel(use) is not None)
+
+    @property
+    def mapped(self) -> bool:
+        """Whether the shading reads any texture."""
+        return bool(self.textured) or self.normal_map or self.direction_map
+
+    def picture_of(self, name: str) -> str:
+        """The parameter under whose name the texture of `name` is bound."""
+        return dict(self.shared).get(name, name)
 
     def __str__(self) -> str:
         lights = [f"{group.count or 'many'} {group.key}" for group in self.lights] + ["ambient"] * (self.ambient != "none")
-        extras = [f"{name} textured" for name in self.textured]
-        extras += ["normal map"] * self.normal_map + ["vertex colours"] * self.vertex_colours
+        channels = {name: channel(use) for name, use in self.parameters}
+        extras = [f"{name} textured" + f" ({channels[name]})" * bool(channels[name]) for name in self.textured]
+        extras += ["normal map" + " (mirrored)" * (self.normal_span != (1, 1))] * self.normal_map
+        extras += ["tangents by a map"] * self.direction_map + ["tangents turned"] * self.turned
+        extras += ["vertex colours"] * self.vertex_colours
+        extras += ["normals not normalised"] * (not self.normalise) + ["fast arithmetic"] * (self.arithmetic == "fast")
         extras += ["both sides"] * self.both_sides + [f"alpha {self.alpha}"] * (self.alpha != "opaque")
         parts = [name for _, text in self.slots for name in _INCLUDED.findall(text)]
         model = self.brdf + f" ({', '.join(parts)})" * bool(parts)
@@ -164,7 +193,8 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
     asked = material.asked("light") if groups else frozenset()
     asked |= material.asked("ambient") if how == "varying" else frozenset()
     asked |= {model.parameters()[name].same_as or name for name in asked if getattr(material, name) is None}
-    parameters = []
+    parameters, shared = [], []
+    pictures: dict[Texels, str] = {}
     for name, declared in model.parameters().items():
         value = getattr(material, name)
         if name not in asked:
@@ -173,10 +203,16 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
             use = declared.same_as
         else:
             grey = model.is_colour(name) and not isinstance(value, Texture) and is_grey(value)
-            use = "texture" if isinstance(value, Texture) else "grey" if grey else "uniform"
+            use = "grey" if grey else "uniform"
+            if isinstance(value, Texture):
+                use = "texture" if model.is_colour(name) else f"texture.{value.channel or 'r'}"
+                first = pictures.setdefault(texels(material, name), name)
+                shared += [(name, first)] * (first != name)
         parameters.append((name, use))
     base = next((name for name, declared in model.parameters().items() if declared.base), None)
     carries_alpha = material.alpha_mode != "opaque" and base is not None and isinstance(getattr(material, base), Texture)
+    bumpy = (material.normal_map is not None or material.bump_map is not None) and bool(groups)
+    tangents = material.needs_tangents and bool(groups)
     return ProgramPlan(
         rate=instance.rate,
         brdf=material.brdf,
@@ -189,10 +225,22 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         alpha=material.alpha_mode,
         alpha_from=base if carries_alpha else None,
         vertex_colours=instance.vertex_colours and (bool(groups) or ambient or material.alpha_mode != "opaque"),
-        normal_map=material.normal_map is not None and bool(groups),
-        anisotropic=material.needs_tangents and bool(groups),
+        normal_map=bumpy,
+        anisotropic=tangents,
         encoding=encoding,
+        shared=tuple(shared),
+        normal_span=texels(material, "bump_map").span if bumpy and material.bump_map else (1, 1),
+        turned=tangents and turn(material) % 360 != 0,
+        direction_map=tangents and isinstance(material.tangent_direction, DirectionMap),
+        normalise=instance.quality.normalise is not False or not groups or instance.rate != "phong" or bumpy or tangents,
+        arithmetic=(instance.quality.arithmetic if groups else None) or "stable",
     )
+
+
+def turn(material: Brdf) -> float:
+    """How far the tangents, or the directions that take their place, are turned [degrees]."""
+    direction = material.tangent_direction
+    return direction.rotate if isinstance(direction, DirectionMap) else direction
 
 
 def explain(scene: Scene, shading: Rate | None = None) -> Plan:
@@ -216,7 +264,11 @@ def plan(assembly: Assembly, encoding: Literal["linear", "srgb"]) -> Plan:
         for name in program.textured:
             reasons.setdefault(f"texture of {name}", instance.name)
         if program.normal_map:
-            reasons.setdefault("normal map", instance.name)
+            reasons.setdefault("bump map" if instance.material.bump_map else "normal map", instance.name)
+        if program.direction_map:
+            reasons.setdefault("directions of tangents", instance.name)
+        if program.turned:
+            reasons.setdefault("tangents turned", f"{instance.name}, by {turn(instance.material):g} degrees")
         if program.vertex_colours:
             reasons.setdefault("vertex colours", instance.name)
         if program.both_sides:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, SkipValidation, Tag, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, SkipValidation, Tag, WithJsonSchema, model_validator
 
 from glshade.brdfs import BRDFS, Brdf
 from glshade.camera import CAMERAS, Camera, Matrix4, Perspective, affine
@@ -16,6 +16,8 @@ from glshade.errors import AssetError
 from glshade.image import srgb_to_linear
 from glshade.lights import LIGHTS, Light
 from glshade.mesh import Mesh
+from glshade.presets import PRESETS, FromPreset, preset
+from glshade.quality import Quality
 from glshade.shape import SHAPES, Shape
 
 Array = NDArray[np.float64]
@@ -100,7 +102,7 @@ MeshSource = Annotated[
     Discriminator(_mesh_branch),
     WithJsonSchema({"type": "string", "format": "path"}),
 ]
-Material = Annotated[Brdf, Chosen(BRDFS, "brdf")]
+Material = Annotated[Brdf, Chosen(BRDFS, "brdf"), FromPreset()]
 
 
 def _material_branch(value: Any) -> str:
@@ -118,7 +120,10 @@ class Object(Document):
     material: (
         Annotated[Annotated[str, Tag("<shorthand>")] | Annotated[Material, Tag("<table>")], Discriminator(_material_branch)]
         | None
-    ) = Field(None, description="name of a material, or a material in place; left out: the mesh file's own, else grey phong")
+    ) = Field(
+        None,
+        description="name of a material or a preset, or a material in place; left out: the mesh file's own, else grey phong",
+    )
     shading: Rate = Field("phong", description="where the model is evaluated: per face, per vertex or per pixel")
     normals: Normals = Field("auto", description="face; smooth up to the threshold; auto: the mesh's own where it has them")
     threshold: Annotated[float, Field(ge=0, le=180)] = Field(
@@ -126,11 +131,14 @@ class Object(Document):
     )
     sides: Sides = Field("auto", description="front: back faces are culled; both: normals turn to the viewer; auto: what fits")
     vertex_colours: bool = Field(True, description="whether the mesh's vertex colours multiply the base colour")
+    quality: Quality | None = Field(None, description="its own, before the scene's; not storage, which all objects share")
 
     @classmethod
     def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
         if isinstance(data, Mapping) and (data.get("mesh") is None) == (data.get("shape") is None):
             yield (), "needs a mesh or a shape, and not both"
+        if _get(_get(data, "quality"), "storage") is not None:
+            yield ("quality", "storage"), "is the whole picture's: it belongs into the scene's own [quality]"
 
 
 def _colour_with_alpha(value: tuple[float, ...]) -> tuple[float, ...]:
@@ -169,11 +177,26 @@ class Scene(Document):
     description: str = Field("", description="what there is to see")
     film: Film = Field(default_factory=Film)
     camera: Annotated[Camera, Chosen(CAMERAS, "type", default="perspective")] = Field(default_factory=Perspective)
-    materials: dict[str, Material] = Field({}, description="name -> material")
+    materials: dict[str, Material] = Field(
+        {}, description='name -> material; `preset = "gold"` in place of its brdf: the keys of a preset where it has no other'
+    )
     objects: tuple[Object, ...] = Field(description="what is drawn")
     lights: tuple[Annotated[Light, Chosen(LIGHTS, "type")], ...] | None = Field(
         None, description="left out: a key light, a fill and a little ambient, placed about the camera; [] is darkness"
     )
+
+    quality: Quality = Field(default_factory=Quality, description="what is traded for speed")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_presets(cls, data: Any) -> Any:
+        """Presets that objects name become materials of the scene: it says all that it is made of."""
+        own = data.get("materials", {}) if isinstance(data, Mapping) else None
+        if not isinstance(own, Mapping):
+            return data
+        named = [_get(item, "material") for item in _items(data, "objects")]
+        used = {name: preset(name) for name in named if isinstance(name, str) and name in PRESETS and name not in own}
+        return {**data, "materials": {**own, **used}} if used else data
 
     @classmethod
     def cross_faults(cls, data: Any) -> Iterator[tuple[tuple[str | int, ...], str]]:
@@ -192,10 +215,10 @@ class Scene(Document):
         parents = {_get(item, "name"): _get(item, "parent") for item in objects}
         for index, item in enumerate(objects):
             material, parent = _get(item, "material"), _get(item, "parent")
-            if isinstance(material, str) and material not in materials:
+            if isinstance(material, str) and material not in materials and material not in PRESETS:
                 yield (
                     ("objects", index, "material"),
-                    f'no material is named "{material}"' + nearest(material, materials),
+                    f'no material or preset is named "{material}"' + nearest(material, {*materials, *PRESETS}),
                 )
             if parent is None:
                 continue

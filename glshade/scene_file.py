@@ -15,7 +15,7 @@ from glshade.document import Document
 from glshade.errors import AssetError, SceneError
 from glshade.image import probe
 from glshade.scene import Film, Object, Scene
-from glshade.texture import NormalMap, Texture
+from glshade.texture import Picture
 
 TEXT_SUFFIXES = (".toml", ".json")
 
@@ -64,7 +64,7 @@ def _pictures(scene: Scene) -> Iterator[tuple[str, Path]]:
         if isinstance(material, Document):
             for name in type(material).model_fields:
                 value = getattr(material, name)
-                if isinstance(value, Texture | NormalMap):
+                if isinstance(value, Picture):
                     yield f"{place}.{name}.texture", value.texture
 
 

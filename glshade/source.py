@@ -12,11 +12,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from glshade.brdfs import BRDFS
+from glshade.brdfs import BRDFS, Parameter
 from glshade.document import nearest
 from glshade.errors import ShaderError
 from glshade.lights import LIGHTS
-from glshade.plan import LightGroup, ProgramPlan
+from glshade.plan import LightGroup, ProgramPlan, channel
 
 # Inside a wheel the shaders lie beside this module; in a checkout, beside the package.
 _INSTALLED = Path(__file__).parent / "_shaders"
@@ -49,10 +49,11 @@ class Source:
     fragment: Stage | None
 
 
-def expand(name: str, generated: Mapping[str, str], root: Path | None = None) -> Stage:
+def expand(name: str, generated: Mapping[str, str], root: Path | None = None, fast: bool = False) -> Stage:
     """The file `name` under the shader folder with its includes in place, each once.
 
-    generated: text for the includes in angle brackets. Errors: ShaderError for a file that is not there.
+    generated: text for the includes in angle brackets. fast: a file that has another of its name under fast/ gives way to it.
+    Errors: ShaderError for a file that is not there.
     """
     root = root or SHADERS
     text: list[str] = []
@@ -74,6 +75,7 @@ def expand(name: str, generated: Mapping[str, str], root: Path | None = None) ->
                 lines.append((file, number))
                 continue
             path, slot = include.groups()
+            path = f"fast/{path}" if fast and path and (root / "fast" / path).is_file() else path
             wanted = path or f"<{slot}>"
             if wanted in seen:
                 continue
@@ -104,7 +106,8 @@ def generate(plan: ProgramPlan) -> Source:
         vertex_pass = f"{name}.vert"
         fragment_pass = f"{name}.frag" if plan.rate == "gouraud" else "flat.frag"
     fragment["output"] = f'#include "output/{plan.encoding}.glsl"\n'
-    return Source(expand(f"pass/{vertex_pass}", vertex), expand(f"pass/{fragment_pass}", fragment))
+    fast = plan.arithmetic == "fast"
+    return Source(expand(f"pass/{vertex_pass}", vertex, fast=fast), expand(f"pass/{fragment_pass}", fragment, fast=fast))
 
 
 class _Interpolated:
@@ -139,7 +142,7 @@ TYPES = {"position": "vec3", "normal": "vec3", "tangent": "vec4", "uv": "vec2", 
 def _wanted(plan: ProgramPlan) -> list[str]:
     """What the shading asks of a surface, in a fixed order."""
     wanted = ["position"] * plan.positions + ["normal"] * plan.directed + ["tangent"] * plan.tangents
-    return wanted + ["uv"] * bool(plan.textured or plan.normal_map) + ["colour"] * plan.vertex_colours
+    return wanted + ["uv"] * plan.mapped + ["colour"] * plan.vertex_colours
 
 
 def _varyings(plan: ProgramPlan, direction: str) -> str:
@@ -188,6 +191,7 @@ def _material(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
     model, struct = BRDFS[plan.brdf], BRDFS.class_name(plan.brdf)
     declared = model.parameters()
     text, body = f'#include "brdf/{plan.brdf}.glsl"\n', []
+    bound: set[str] = set()
     for name, use in plan.parameters:
         colour = model.is_colour(name)
         kind, channels = ("vec3", "rgb") if colour else ("float", "r")
@@ -201,13 +205,28 @@ def _material(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
         text += f"uniform {'float' if use == 'grey' else kind} u_{name};\n"
         if use == "grey":
             value = f"vec3({value})"
-        if use == "texture":
-            text += f"uniform sampler2D u_{name}_texture;\n"
-            value += f" * texture(u_{name}_texture, {at.uv}).{channels}"
+        which = channel(use)
+        if which is not None:
+            picture = plan.picture_of(name)
+            if picture not in bound:
+                bound.add(picture)
+                text += f"uniform sampler2D u_{picture}_texture;\n"
+            value = _bounded(f"{value} * texture(u_{picture}_texture, {at.uv}).{which or channels}", declared[name])
         if declared[name].base and plan.vertex_colours:
             value += f" * {at.colour}.rgb"
         body.append(f"    m.{name} = {value};")
     return text + f"\n{struct} material() {{\n    {struct} m;\n" + "\n".join(body) + "\n    return m;\n}\n"
+
+
+def _bounded(value: str, declared: Parameter) -> str:
+    """A texel beyond what a parameter may be counts as the nearest that it may."""
+    low = repr(float(declared.low))
+    return f"max({value}, {low})" if declared.high is None else f"clamp({value}, {low}, {float(declared.high)!r})"
+
+
+def bound_for_shading(plan: ProgramPlan, name: str) -> bool:
+    """Whether the shading already has a sampler of this parameter's name."""
+    return name in {plan.picture_of(textured) for textured in plan.textured}
 
 
 def _frame(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
@@ -216,15 +235,29 @@ def _frame(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
         text += '#include "lib/normal_map.glsl"\nuniform sampler2D u_normal_map;\nuniform float u_normal_scale;\n'
     elif plan.tangents:
         text += '#include "lib/tangent_frame.glsl"\n'
+    if plan.turned or plan.direction_map:
+        text += '#include "lib/turned_frame.glsl"\n'
+    if plan.direction_map:
+        text += '#include "lib/direction_map.glsl"\nuniform sampler2D u_direction_map;\n'
+    if plan.turned:
+        text += "uniform vec2 u_turn;\n"
     text += "\n// side: -1 turns the normal over.\nFrame frame(float side) {\n"
     if plan.normal_map:
-        sample = f"texture(u_normal_map, {at.uv}).xyz"
-        text += f"    return mapped_frame({at.normal}, {at.tangent}, side, {sample}, u_normal_scale);\n"
+        u, v = plan.normal_span
+        # A division by two is exact, and so is the level of detail.
+        uv = at.uv if (u, v) == (1, 1) else f"{at.uv} / vec2({u}.0, {v}.0)"
+        sample = f"texture(u_normal_map, {uv}).xyz"
+        frame = f"mapped_frame({at.normal}, {at.tangent}, side, {sample}, u_normal_scale)"
     elif plan.tangents:
-        text += f"    return tangent_frame({at.normal}, {at.tangent}, side);\n"
+        frame = f"tangent_frame({at.normal}, {at.tangent}, side)"
     else:
-        text += f"    return Frame(side * unit({at.normal}), vec3(0.0), vec3(0.0));\n"
-    return text + "}\n"
+        normal = f"unit({at.normal})" if plan.normalise else at.normal
+        frame = f"Frame(side * {normal}, vec3(0.0), vec3(0.0))"
+    if plan.direction_map:
+        frame = f"turned_frame({frame}, mapped_direction(texture(u_direction_map, {at.uv}).rg))"
+    if plan.turned:
+        frame = f"turned_frame({frame}, u_turn)"
+    return text + f"    return {frame};\n}}\n"
 
 
 def _declared_lights(group: LightGroup) -> str:
@@ -321,7 +354,7 @@ def _alpha(plan: ProgramPlan) -> str:
         return "\nfloat alpha() {\n    return 1.0;\n}\n"
     text, value = "uniform float u_alpha;\n", "u_alpha"
     if plan.alpha_from:
-        if plan.rate != "phong" or (plan.alpha_from, "texture") not in plan.parameters:
+        if plan.rate != "phong" or not bound_for_shading(plan, plan.alpha_from):
             text += f"uniform sampler2D u_{plan.alpha_from}_texture;\n"
         value += f" * texture(u_{plan.alpha_from}_texture, v_uv).a"
     if plan.vertex_colours:

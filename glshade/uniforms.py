@@ -7,6 +7,9 @@ that the two renderers share their inputs and nothing else.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,7 +19,8 @@ from numpy.typing import NDArray
 from glshade.assembly import Assembly, Instance
 from glshade.brdfs import Brdf
 from glshade.lights import LIGHTS, Falloff, Light
-from glshade.plan import LightGroup, ProgramPlan
+from glshade.plan import LightGroup, ProgramPlan, channel, turn
+from glshade.texels import Texels, texels
 from glshade.texture import Texture
 
 Array = NDArray[np.float64]
@@ -26,7 +30,20 @@ Values = dict[str, NDArray[np.float32]]
 def rounded(value: Any) -> NDArray[np.float32]:
     """float32; what is too large for it becomes infinite, and is refused by the renderer."""
     with np.errstate(over="ignore"):
-        return np.asarray(value, dtype=np.float64).astype(np.float32)
+        return np.asarray(value, dtype=np.float64).astype(_precision.get())
+
+
+_precision: ContextVar[Any] = ContextVar("precision", default=np.float32)
+
+
+@contextmanager
+def unrounded() -> Iterator[None]:
+    """Within it `rounded` leaves float64 as it is: for the reference alone, to see what rounding the inputs costs."""
+    token = _precision.set(np.float64)
+    try:
+        yield
+    finally:
+        _precision.reset(token)
 
 
 def object_uniforms(plan: ProgramPlan, instance: Instance, eye: Array) -> Values:
@@ -48,12 +65,15 @@ def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
     values: dict[str, Any] = {}
     for name, use in plan.parameters:
         value = getattr(material, name)
-        if use == "texture":
+        if channel(use) is not None:
             values[f"u_{name}"] = value.factor if type(material).is_colour(name) else value.factor[0]
         elif use in ("uniform", "grey"):
             values[f"u_{name}"] = value if use == "uniform" else value[0]
     if plan.normal_map:
-        values["u_normal_scale"] = material.normal_map.scale
+        # The normals of heights are those of a surface of height 1.
+        values["u_normal_scale"] = material.bump_map.height if material.bump_map else material.normal_map.scale
+    if plan.turned:
+        values["u_turn"] = direction(material)
     if plan.alpha != "opaque":
         values["u_alpha"] = material.alpha
     if plan.alpha == "mask":
@@ -61,19 +81,21 @@ def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
     return values
 
 
-def textures(plan: ProgramPlan, material: Any) -> dict[str, Any]:
-    """sampler name -> Texture or NormalMap."""
-    found: dict[str, Any] = {}
-    for name in plan.textured:
-        texture = getattr(material, name)
-        if texture.encoding == "auto" and not type(material).is_colour(name):
-            # Numbers, not colours: nobody encodes them.
-            texture = texture.model_copy(update={"encoding": "linear"})
-        found[f"u_{name}_texture"] = texture
+def direction(material: Brdf) -> Array:
+    """(2,): cos and sin of the angle by which tangents are turned."""
+    angle = math.radians(turn(material) % 360)
+    return np.array([math.cos(angle), math.sin(angle)])
+
+
+def textures(plan: ProgramPlan, material: Brdf) -> dict[str, Texels]:
+    """sampler name -> what it samples."""
+    found = {f"u_{plan.picture_of(name)}_texture": texels(material, name) for name in plan.textured}
     if plan.alpha_from:
-        found[f"u_{plan.alpha_from}_texture"] = getattr(material, plan.alpha_from)
+        found[f"u_{plan.alpha_from}_texture"] = texels(material, plan.alpha_from)
     if plan.normal_map:
-        found["u_normal_map"] = material.normal_map
+        found["u_normal_map"] = texels(material, "bump_map" if material.bump_map else "normal_map")
+    if plan.direction_map:
+        found["u_direction_map"] = texels(material, "tangent_direction")
     return found
 
 

@@ -168,13 +168,7 @@ def candidates(scene: Scene, *, shading: Rate | None = None, driver: Driver = LL
     """What the float64 reference says that the picture may be. Errors: SceneError."""
     inputs = reference.prepare(scene, shading)
     width, height = inputs.size
-    solid, layers = _seen(inputs, driver)
-    kept, classes, open_, hidden = classify(
-        width * height, solid.fragments.pixel, solid.fragments.depth, solid.slack, solid.partial, solid.sealed
-    )
-    solid = solid.take(kept)
-    order = np.argsort(solid.fragments.pixel, kind="stable")
-    solid = solid.take(order)
+    solid, layers, classes, open_, hidden = _classified(inputs, driver)
     found = reference.bounds(inputs, solid.fragments, driver)
     over = layers.take(layers.fragments.depth + layers.slack >= hidden[layers.fragments.pixel])
     over = over.take(np.lexsort((over.fragments.triangle, over.fragments.draw, over.fragments.pixel)))
@@ -208,6 +202,33 @@ def candidates(scene: Scene, *, shading: Rate | None = None, driver: Driver = LL
     first = np.flatnonzero(np.append(True, pixel[1:] != pixel[:-1])) if len(pixel) else np.empty(0, dtype=np.intp)
     picture[pixel[first]] = centre[first]
     return Candidates(inputs, expected, solid.fragments, found, base, picture.reshape(height, width, 4))
+
+
+def surfaces(scene: Scene, *, driver: Driver = LLVMPIPE) -> tuple[NDArray[np.intp], Flags]:
+    """(object (H, W), certain (H, W)): which of the scene's objects is nearest, -1 for the background; where no driver could
+    think otherwise. Errors: SceneError."""
+    inputs = reference.prepare(single_sample(scene))
+    width, height = inputs.size
+    solid, layers, classes, _, _ = _classified(inputs, driver)
+    found = np.full(width * height, -1, dtype=np.intp)
+    # The farthest first, so that the nearest is what stays.
+    order = np.argsort(solid.fragments.depth, kind="stable")
+    numbers = np.array([draw.instance.number for draw in inputs.draws], dtype=np.intp)
+    found[solid.fragments.pixel[order]] = numbers[solid.fragments.draw[order]]
+    certain = np.isin(classes, (PixelClass.BACKGROUND, PixelClass.INTERIOR, PixelClass.SEAM))
+    certain[layers.fragments.pixel[layers.partial]] = False
+    return found.reshape(height, width), certain.reshape(height, width)
+
+
+def _classified(inputs: Inputs, driver: Driver) -> tuple[_Pieces, _Pieces, Array, Flags, Array]:
+    """(opaque pieces by pixel, blended ones, classes, open, hidden): what may be seen, as `classify` has it."""
+    width, height = inputs.size
+    solid, layers = _seen(inputs, driver)
+    kept, classes, open_, hidden = classify(
+        width * height, solid.fragments.pixel, solid.fragments.depth, solid.slack, solid.partial, solid.sealed
+    )
+    solid = solid.take(kept)
+    return solid.take(np.argsort(solid.fragments.pixel, kind="stable")), layers, classes, open_, hidden
 
 
 def verify(
@@ -245,8 +266,9 @@ def verify(
 
 
 def single_sample(scene: Scene) -> Scene:
-    """The scene with one sample a pixel."""
-    return scene.model_copy(update={"film": scene.film.model_copy(update={"samples": 1})})
+    """The scene with one sample a pixel, kept in float32: what the reference speaks of."""
+    film = scene.film.model_copy(update={"samples": 1})
+    return scene.model_copy(update={"film": film, "quality": scene.quality.model_copy(update={"storage": None})})
 
 
 def verdict_of(

@@ -28,8 +28,10 @@ from extremes import (  # noqa: E402
     pairs,
     relative,
 )
+from pages import table, write  # noqa: E402
 
 from glshade import BRDFS, Renderer  # noqa: E402
+from glshade.brdfs import Brdf  # noqa: E402
 
 PAGE = ROOT / "docs" / "accuracy.md"
 # Materials of a model: those at the extremes beyond the walk of each parameter alone, and those within the usual ranges.
@@ -58,23 +60,18 @@ The conditioning is what rounding the inputs to float32 does to the float64 valu
 by half an ulp, the normal by 2^-25 rad to its worst side, these moves added up, and half an ulp of the result. A program in
 float32 can hardly promise less than 1. Below 2^-126 stages flush to zero, and that is no error.
 
-The last two columns are the error relative to max(1, f cos) where it was worst in units of the conditioning, and where it was
-worst of all: large where the problem itself is hardly determined, as a step at the horizon is.
+Parameters are those that are not the model's defaults. The last two columns are the error relative to max(1, f cos) where it
+was worst in units of the conditioning, and where it was worst of all: large where the problem itself is hardly determined, as
+a step at the horizon is.
 
-| model | bound | vertex | fragment | worst case | parameters | error there | largest error |
-|---|---|---|---|---|---|---|---|
 {extreme}
-
 ## At ordinary parameters
 
 The usual range of each parameter (in [scene-file.md](scene-file.md)), both directions more than {high:g} above the horizon: the
 error relative to max(1, f cos). Where a model is worse than its bound in some rare direction, it is within {factor:g} x
 conditioning there.
 
-| model | bound | vertex | fragment |
-|---|---|---|---|
-{ordinary}
-"""
+{ordinary}"""
 
 
 def bounds(name: str) -> float:
@@ -112,11 +109,9 @@ def page() -> str:
                 value, _ = exact(material, l[usual], v[usual])
                 for stage in STAGES:
                     common[stage].add(relative(measured(material, stage, renderer, l[usual], v[usual]), value), lambda i: "")
-            figures = " | ".join(f"{extreme[stage].value:.2f}" for stage in STAGES)
-            place = f"{there[0]} | {there[1]} | {there[2]:.1e} | {worst.value:.1e}"
-            extremes.append(f"| `{name}` | {bounds(name):g} | {figures} | {place} |")
-            figures = " | ".join(f"{common[stage].value:.1e}" for stage in STAGES)
-            usuals.append(f"| `{name}` | {ORDINARY:g} | {figures} |")
+            figures = [f"{extreme[stage].value:.2f}" for stage in STAGES]
+            extremes.append((f"`{name}`", f"{bounds(name):g}", *figures, *there[:2], f"{there[2]:.1e}", f"{worst.value:.1e}"))
+            usuals.append((f"`{name}`", f"{ORDINARY:g}", *(f"{common[stage].value:.1e}" for stage in STAGES)))
     own = ", ".join(f"{name}: {bounds(name):g}" for name in BRDFS if bounds(name) != FACTOR)
     return TEXT.format(
         driver=driver,
@@ -124,16 +119,21 @@ def page() -> str:
         factor=FACTOR,
         exceptions=f"    ({own})" if own else "",
         high=HIGH,
-        extreme="\n".join(extremes),
-        ordinary="\n".join(usuals),
+        extreme=table(
+            ("model", "bound", *STAGES, "worst case", "parameters", "error there", "largest error"),
+            extremes,
+        ),
+        ordinary=table(("model", "bound", *STAGES), usuals),
     )
 
 
-def parameters(material: object) -> str:
-    """The scalars of a material, in a few words."""
+def parameters(material: Brdf) -> str:
+    """The scalars and options of a material that are not its model's defaults, in a few words."""
     model = type(material)
-    names = [name for name in model.parameters() if not model.is_colour(name)]  # type: ignore[attr-defined]
-    return ", ".join(f"{name} {getattr(material, name):g}" for name in names) or "-"
+    names = [*(name for name in model.parameters() if not model.is_colour(name)), *model.choices()]
+    given = {name: getattr(material, name) for name in names}
+    said = {name: value for name, value in given.items() if value != model.model_fields[name].default}
+    return ", ".join(f"{name} {value if isinstance(value, str) else f'{value:g}'}" for name, value in said.items()) or "-"
 
 
 def models(text: str) -> list[list[str]]:
@@ -145,4 +145,4 @@ if __name__ == "__main__":
     if sys.argv[1:] == ["--check"]:
         current = PAGE.exists() and models(PAGE.read_text(encoding="utf-8")) == [list(BRDFS)] * 2
         sys.exit(0 if current else "docs/accuracy.md has other models than glshade/brdfs: run script/make-accuracy")
-    PAGE.write_text(page(), encoding="utf-8")
+    write(PAGE, page())

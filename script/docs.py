@@ -14,7 +14,7 @@ from glshade.document import Document
 from glshade.lights import LIGHTS, Light
 from glshade.scene import Film, Object, Scene, Transform
 from glshade.shape import SHAPES
-from glshade.texture import NormalMap, Texture
+from glshade.texture import BumpMap, DirectionMap, NormalMap, Texture
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "scene-file.md"
@@ -25,6 +25,7 @@ PICTURES = (
     ("ashikhmin-shirley-grid", 460),
     ("half-angle-grazing", 460),
     ("detail", 460),
+    ("materials", 960),
 )
 
 INTRODUCTION = """\
@@ -54,6 +55,12 @@ NAMED = {
     ("Object", "material"): "name, or [material](#materials)",
     ("Film", "background"): "3 or 4 numbers",
 }
+TABLES = {
+    "Texture": "[texture](#textures)",
+    "NormalMap": "[normal map](#normal-maps)",
+    "BumpMap": "[bump map](#bump-maps)",
+    "DirectionMap": "[direction map](#direction-maps)",
+}
 SAID = {
     ("Scene", "film"): "what the picture is recorded on",
     ("Scene", "camera"): "who looks; left out: a perspective view of the whole scene",
@@ -69,7 +76,7 @@ def kind(schema: Mapping[str, Any]) -> str:
         return ", ".join(f"`{json.dumps(value)}`" for value in schema["enum"])
     if "$ref" in schema:
         name = schema["$ref"].rsplit("/", 1)[-1]
-        return {"Texture": "[texture](#textures)", "NormalMap": "[normal map](#normal-maps)"}.get(name, name)
+        return TABLES.get(name, name)
     options = [option for option in schema.get("anyOf", schema.get("oneOf", ())) if option.get("type") != "null"]
     if options:
         words = [kind(option) for option in options]
@@ -176,6 +183,7 @@ def scene_file() -> str:
         text += section(3, f"`{name}`", BRDFS[name], Brdf)
         text += f"\nSource: {BRDFS[name].source}.\n"
     text += section(3, "Textures", Texture) + section(3, "Normal maps", NormalMap)
+    text += section(3, "Bump maps", BumpMap) + section(3, "Direction maps", DirectionMap)
     text += section(2, "Lights", Light)
     for name in LIGHTS:
         text += section(3, f"`{name}`", LIGHTS[name], Light)

@@ -43,6 +43,10 @@ def plans() -> Iterator[ProgramPlan]:
     rates, viewers = ("flat", "gouraud", "phong"), ("perspective", "orthographic")
     for (name, model), use in itertools.product(BRDFS.items(), ("uniform", "texture")):
         parameters = tuple((p, use) for p in model.parameters())
+        if use == "texture":
+            parameters = tuple(
+                (p, use if model.is_colour(p) else f"{use}.{'rgba'[i % 4]}") for i, p in enumerate(model.parameters())
+            )
         unused = tuple((p, "unused") for p in model.parameters())
         textured = parameters[0][0] if use == "texture" else None
         base = ProgramPlan(
@@ -68,6 +72,13 @@ def plans() -> Iterator[ProgramPlan]:
             yield replace(one, ambient="constant", lights=groups(1)[:1])
             yield replace(one, normal_map=True, vertex_colours=True, alpha="mask", alpha_from=textured)
             yield replace(one, vertex_colours=True, alpha="blend", alpha_from=textured)
+            yield replace(one, normal_map=True, normal_span=(2, 1))
+            if use == "texture":
+                yield replace(one, shared=tuple((p, parameters[0][0]) for p, _ in parameters[1:]))
+            if model.anisotropic:
+                for bumps, turned in itertools.product((False, True), repeat=2):
+                    yield replace(one, normal_map=bumps, turned=turned, direction_map=True)
+                yield replace(one, turned=True)
             if not both:
                 yield replace(one, lights=())
                 yield replace(one, lights=(), ambient="constant", parameters=unused)

@@ -46,7 +46,7 @@ def walk(declared: Parameter) -> list[float]:
     found = {declared.low, high, *declared.usual, 1e-4, 1e-3, 1.0}
     if high >= WIDE:
         found |= {10.0**k for k in range(9)}
-    return sorted(float(np.float32(x)) for x in found if declared.low <= x <= high)
+    return sorted({min(max(float(np.float32(x)), declared.low), high) for x in found if declared.low <= x <= high})
 
 
 def at_extremes(name: str, most: int) -> list[Brdf]:

@@ -4,7 +4,7 @@ A model's class is its entry in the scene file: parameters with default, range, 
 float64: f cos = BRDF times max(n.l, 0) [1/sr], 0 where n.l <= 0 or n.v <= 0.
 """
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
@@ -18,18 +18,20 @@ from pydantic_core import CoreSchema
 
 from glshade.document import Document, Finite, Triple, fault
 from glshade.found import Found
-from glshade.texture import NormalMap, Texture
+from glshade.texture import BumpMap, DirectionMap, NormalMap, Picture, Texture
 
 Array = NDArray[np.float64]
 
 
 def _branch(value: Any) -> str:
-    return "<texture-table>" if isinstance(value, Mapping | Texture) else "<value>"
+    return "<texture-table>" if isinstance(value, Mapping | Picture) else "<value>"
 
 
 # What a parameter may be: three numbers (one stands for three) or one number, or a texture.
 Colour = Annotated[Annotated[Triple, Tag("<value>")] | Annotated[Texture, Tag("<texture-table>")], Discriminator(_branch)]
 Scalar = Annotated[Annotated[Finite, Tag("<value>")] | Annotated[Texture, Tag("<texture-table>")], Discriminator(_branch)]
+# An angle, or a picture of directions.
+Turn = Annotated[Annotated[Finite, Tag("<value>")] | Annotated[DirectionMap, Tag("<texture-table>")], Discriminator(_branch)]
 
 
 @dataclass(frozen=True)
@@ -86,6 +88,10 @@ class Brdf(Document):
     )
     alpha_cutoff: Annotated[float, Field(ge=0, le=1)] = Field(0.5, description="mask: what is less opaque is cut out")
     normal_map: NormalMap | None = Field(None, description="tangent-space normals")
+    bump_map: BumpMap | None = Field(None, description="or heights, from which normals are made")
+    tangent_direction: Turn = Field(
+        0.0, description="anisotropic models: how far the tangent is turned, from u toward v [degrees]"
+    )
     sides: Literal["auto", "front", "both"] = Field("auto", description="sides of the surface; an object may say otherwise")
 
     # Paper, year and equations.
@@ -131,6 +137,10 @@ class Brdf(Document):
         """option -> choice."""
         return {name: getattr(self, name) for name in self.choices()}
 
+    def half_angle(self) -> "Brdf":
+        """The model with h in place of the mirror direction, where it has that: an approximation (lecture slide 20)."""
+        return self
+
     def slots(self) -> dict[str, str]:
         """GLSL for the places that the model's file names in angle brackets. What this material does not need is not in it."""
         return {}
@@ -175,10 +185,22 @@ class Brdf(Document):
             _bound(properties[name], declared)
         return described
 
+    @classmethod
+    def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
+        if not isinstance(data, Mapping):
+            return
+        if data.get("normal_map") is not None and data.get("bump_map") is not None:
+            yield ("bump_map",), "not together with normal_map: each says which way the surface faces"
+        if not cls.anisotropic and data.get("tangent_direction", 0) != 0:
+            name = data.get("brdf", cls.model_fields["brdf"].default)
+            yield ("tangent_direction",), f"{name} is alike all round: it has no direction to turn"
+
     @field_validator("*", mode="after")
     @classmethod
     def _within(cls, value: Any, info: ValidationInfo) -> Any:
         declared = cls.parameters().get(info.field_name or "")
+        if declared is not None and isinstance(value, Texture) and value.channel and cls.is_colour(info.field_name or ""):
+            raise fault(f'a colour takes three channels, and cannot be told channel = "{value.channel}"')
         if declared is None or value is None or isinstance(value, Texture):
             return value
         numbers = value if isinstance(value, tuple) else (value,)

@@ -12,6 +12,8 @@ from glshade.brdfs.blinn_phong import half_vector
 class AshikhminShirley(Brdf):
     """Anisotropic specular with Schlick's Fresnel over an energy-preserving diffuse term. Reflects ambient light with kd.
 
+    Reciprocal. kd and ks share no budget: the diffuse term leaves room, and with kd = ks = 1 no more light leaves than arrives.
+
     Lecture slide 42 writes (n.u)^2 and (n.v)^2 in the exponent, which are 0; the paper, and this, have (h.u)^2 and (h.v)^2.
     """
 

@@ -5,7 +5,8 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from glshade.brdfs import Array, Brdf, Colour, Parameter, Scalar, above_horizon, parameter
+from glshade.brdfs import Array, Brdf, Colour, Law, Limit, Parameter, Scalar, above_horizon, parameter
+from glshade.brdfs.lambert import Lambert
 from glshade.brdfs.phong import power_of_cosine, without_lobe
 
 
@@ -16,12 +17,22 @@ class BlinnPhong(Brdf):
     """
 
     source: ClassVar[str] = "Blinn 1977; lecture slide 20"
+    breaks: ClassVar[dict[Law, str]] = {
+        "reciprocity": "the lobe is not divided by n.l, as in phong",
+        "energy": "the lobe reflects more than ks where p is small: up to 2 ks at p = 0, 1.72 ks at p = 1, ks at p = 5.4",
+    }
+    shares: ClassVar[tuple[str, ...]] = ("kd", "ks")
 
     brdf: Literal["blinn_phong"] = "blinn_phong"
     kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance", base=True))
     ks: Colour = parameter((0.2, 0.2, 0.2), Parameter("specular strength at the lobe's centre"))
     exponent: Scalar = parameter(128.0, Parameter("narrowness of the lobe, p", high=1e8, usual=(1.0, 1000.0)))
     ka: Colour | None = parameter(None, Parameter("ambient reflectance; left out: kd", same_as="kd"))
+
+    @classmethod
+    def limits(cls) -> tuple[Limit, ...]:
+        kd = (0.8, 0.5, 0.2)
+        return (Limit("ks = 0 is lambert", cls(kd=kd, ks=(0.0, 0.0, 0.0)), Lambert(kd=kd)),)
 
     def canonical(self, ambient: bool) -> Brdf:
         return without_lobe(self, ambient)

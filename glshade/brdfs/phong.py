@@ -5,8 +5,9 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from glshade.brdfs import Array, Brdf, Colour, Parameter, Scalar, above_horizon, parameter
+from glshade.brdfs import BRDFS, Array, Brdf, Colour, Law, Limit, Parameter, Scalar, above_horizon, parameter
 from glshade.brdfs.lambert import Lambert
+from glshade.texture import Texture
 
 
 class Phong(Brdf):
@@ -16,6 +17,11 @@ class Phong(Brdf):
     """
 
     source: ClassVar[str] = "Phong 1975; lecture slides 12, 17-24"
+    breaks: ClassVar[dict[Law, str]] = {
+        "reciprocity": "the lobe is not divided by n.l: the lecture's model, made up, has f cos = ks (r.v)^p / pi",
+        "energy": "the lobe reflects 2 ks/(p + 1) at normal incidence: more than ks where p is below 1",
+    }
+    shares: ClassVar[tuple[str, ...]] = ("kd", "ks")
 
     brdf: Literal["phong"] = "phong"
     kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance", base=True))
@@ -23,8 +29,16 @@ class Phong(Brdf):
     exponent: Scalar = parameter(32.0, Parameter("narrowness of the lobe, p", high=1e8, usual=(1.0, 1000.0)))
     ka: Colour | None = parameter(None, Parameter("ambient reflectance; left out: kd", same_as="kd"))
 
+    @classmethod
+    def limits(cls) -> tuple[Limit, ...]:
+        kd = (0.8, 0.5, 0.2)
+        return (Limit("ks = 0 is lambert", cls(kd=kd, ks=(0.0, 0.0, 0.0)), Lambert(kd=kd)),)
+
     def canonical(self, ambient: bool) -> Brdf:
         return without_lobe(self, ambient)
+
+    def half_angle(self) -> Brdf:
+        return with_half_angle(self, "blinn_phong")
 
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
@@ -39,11 +53,20 @@ class Phong(Brdf):
 
 
 def without_lobe(material: Any, ambient: bool) -> Brdf:
-    """Lambert in place of a phong or blinn_phong whose ks is zero, unless ambient light would show a ka of its own."""
-    if material.ks == (0.0, 0.0, 0.0) and not (ambient and material.ka not in (None, material.kd)):
+    """Lambert in place of kd and a lobe whose ks is zero, unless ambient light would show a ka of its own."""
+    ka = getattr(material, "ka", None)
+    if material.ks == (0.0, 0.0, 0.0) and not (ambient and ka not in (None, material.kd)):
         surface = {name: getattr(material, name) for name in Brdf.model_fields if name != "brdf"}
         return Lambert.model_construct(brdf="lambert", kd=material.kd, **surface)
     return material  # type: ignore[no-any-return]
+
+
+def with_half_angle(material: Any, model: str) -> Brdf:
+    """The material in the model that has h in place of r. At normal incidence h turns half as far as r: four times p."""
+    p = material.exponent
+    fourfold = p.model_copy(update={"factor": tuple(4 * x for x in p.factor)}) if isinstance(p, Texture) else min(4 * p, 1e8)
+    values = {name: getattr(material, name) for name in type(material).model_fields}
+    return BRDFS[model].model_construct(**{**values, "brdf": model, "exponent": fourfold})
 
 
 def power_of_cosine(a: Array, b: Array, p: Array) -> Array:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import re
+from pathlib import Path
 from typing import Any
 
+from glshade.errors import AssetError
 from glshade.formats.contents import Material
 from glshade.formats.file import File
 
@@ -39,7 +41,7 @@ def _material(file: File, name: str, given: dict[str, str]) -> Material:
 
     kd: Any = colour("kd")
     if "map_kd" in given:
-        texture, wrap = _map_statement(file, given["map_kd"])
+        texture, wrap, _ = _map_statement(file, given["map_kd"])
         if texture:
             # Many exporters leave Kd at 0 beside a map; taken as a factor it would turn the picture black.
             kd = {"texture": texture, "factor": kd if kd and any(kd) else [1.0, 1.0, 1.0]} | wrap
@@ -55,11 +57,15 @@ def _material(file: File, name: str, given: dict[str, str]) -> Material:
     if ka:
         # Lambert reflects ambient light with kd; a ka of its own makes it a Phong without a highlight.
         material = {"ks": [0.0, 0.0, 0.0]} | material | {"brdf": "phong", "ka": ka}
-    if "norm" in given:
-        texture, wrap = _map_statement(file, given["norm"])
-        if texture:
-            material["normal_map"] = {"texture": texture} | wrap
-    unused = sorted(key for key in given if key.startswith(("map_", "bump", "refl", "disp")) and key != "map_kd")
+    relief = next((key for key in ("norm", "map_bump", "bump") if key in given), None)
+    if relief:
+        texture, wrap, strength = _map_statement(file, given[relief])
+        if texture and (relief == "norm" or _holds_normals(file, texture)):
+            material["normal_map"] = {"texture": texture} | wrap | ({"scale": strength} if strength != 1 else {})
+        elif texture:
+            material["bump_map"] = {"texture": texture, "height": HEIGHT * strength} | wrap
+    used = {"map_kd", relief}
+    unused = sorted(key for key in given if key.startswith(("map_", "bump", "refl", "disp")) and key not in used)
     if unused:
         file.warn(f"material '{name}': {', '.join(unused)} not used")
     # Tr is 1 - d, but some programs write opacity there. Nobody writes a material that cannot be seen, so 1 is theirs
@@ -71,6 +77,25 @@ def _material(file: File, name: str, given: dict[str, str]) -> Material:
     return material
 
 
+# How high white stands for a -bm of 1 [widths of the picture]; the format leaves the unit open.
+HEIGHT = 0.05
+# Heights are grey. In a picture of normals blue, which points outward, lies above red by about half.
+BLUER = 0.2
+
+
+def _holds_normals(file: File, texture: str) -> bool:
+    """Whether a bump map has normals in place of heights, as many programs write it."""
+    from glshade import image
+
+    # What is read here depends on the picture's content, not on its presence alone.
+    file.read(Path(texture))
+    try:
+        pixels, _ = image.read(texture, "linear")
+    except AssetError:
+        return False  # which is said when it is drawn
+    return float((pixels[..., 2] - pixels[..., 0]).mean()) > BLUER
+
+
 # Options of a texture statement and how many words they take; of -o, -s and -t the last two may be missing.
 _MAP_OPTIONS = {
     "-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2, "-texres": 1,
@@ -78,9 +103,9 @@ _MAP_OPTIONS = {
 }  # fmt: skip
 
 
-def _map_statement(file: File, statement: str) -> tuple[str | None, dict[str, list[str]]]:
-    """The texture's path (None if missing) and its wrap mode; names may hold spaces."""
-    wrap = {}
+def _map_statement(file: File, statement: str) -> tuple[str | None, dict[str, list[str]], float]:
+    """The texture's path (None if missing), its wrap mode and its -bm; names may hold spaces."""
+    wrap, strength = {}, 1.0
     while statement.startswith("-") and statement.split()[0].lower() in _MAP_OPTIONS:
         option, *words = statement.split()
         taken = _MAP_OPTIONS[option.lower()]
@@ -88,5 +113,10 @@ def _map_statement(file: File, statement: str) -> tuple[str | None, dict[str, li
             taken = next((k for k, word in enumerate(words[:3]) if not re.fullmatch(r"[-+.\deE]+", word)), 3)
         if option.lower() == "-clamp" and words[:1] == ["on"]:
             wrap = {"wrap": ["clamp", "clamp"]}
+        if option.lower() == "-bm":
+            try:
+                strength = float(words[0])
+            except (IndexError, ValueError):
+                file.warn(f"'{option} {' '.join(words[:1])}' is not a number; left out")
         statement = statement.split(None, taken + 1)[-1] if len(words) > taken else ""
-    return (file.texture(statement) if statement else None), wrap
+    return (file.texture(statement) if statement else None), wrap, strength

@@ -1,4 +1,4 @@
-"""Context: an OpenGL context without a window, and the one call that moderngl does not wrap.
+"""Context: an OpenGL context without a window, with the calls that moderngl does not wrap.
 
 On Linux through EGL (`libEGL.so.1` by its versioned name: machines without development packages have no other). Elsewhere
 `auto` falls back to moderngl's own standalone context. Without EGL, Mesa's OSMesa serves (osmesa.py); one backend a process.
@@ -7,14 +7,19 @@ On Linux through EGL (`libEGL.so.1` by its versioned name: machines without deve
 from __future__ import annotations
 
 import ctypes
+import os
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
+import glcontext
 import moderngl
 
 from glshade.errors import ContextError
+
+if TYPE_CHECKING:
+    from glshade.gl.linker import Linker
 
 Backend = Literal["auto", "egl", "osmesa", "standalone"]
 BACKENDS: tuple[Backend, ...] = ("auto", "egl", "osmesa", "standalone")
@@ -53,15 +58,20 @@ class Context:
     """An OpenGL context, made current.
 
     gl: moderngl's. zero_to_one: whether clip z runs from 0 to 1, which reversed float depth needs to be worth its name.
+    linker: makes programs from what is kept on disk; None where that is off or the driver offers no binaries.
     """
 
-    def __init__(self, gl: moderngl.Context, backend: str, procedure: Callable[[str], int | None]) -> None:
-        self.gl, self.backend = gl, backend
+    def __init__(
+        self, gl: moderngl.Context, backend: str, procedure: Callable[[str], int | None], linker: Linker | None = None
+    ) -> None:
+        self.gl, self.backend, self.linker = gl, backend, linker
         self._procedure = procedure
         # What Python forgets is kept aside until gc() is called with this context current: the same number may be a
         # living object of another context.
         gl.gc_mode = "context_gc"
         self._released = False
+        # Asked now: while another context is current there is no answer, and moderngl would remember that.
+        self._info = gl.info
         clip_control = self.procedure("glClipControl", None, ctypes.c_uint, ctypes.c_uint)
         self.zero_to_one = clip_control is not None and (gl.version_code >= 450 or "GL_ARB_clip_control" in gl.extensions)
         if self.zero_to_one and clip_control is not None:
@@ -70,17 +80,17 @@ class Context:
     @property
     def renderer(self) -> str:
         """GL_RENDERER."""
-        return str(self.gl.info["GL_RENDERER"])
+        return str(self._info["GL_RENDERER"])
 
     @property
     def version(self) -> str:
         """GL_VERSION."""
-        return str(self.gl.info["GL_VERSION"])
+        return str(self._info["GL_VERSION"])
 
     @property
     def largest_side(self) -> int:
         """The largest picture that the driver draws in one piece [pixels]."""
-        info = self.gl.info
+        info = self._info
         return int(min(info["GL_MAX_TEXTURE_SIZE"], info["GL_MAX_RENDERBUFFER_SIZE"], *info["GL_MAX_VIEWPORT_DIMS"]))
 
     def procedure(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any] | None:
@@ -95,25 +105,28 @@ class Context:
             self.gl.release()
 
 
-def open_context(backend: Backend = "auto", device: int | None = None) -> Context:
+def open_context(backend: Backend = "auto", device: int | None = None, program_cache: bool | None = None) -> Context:
     """A new context on the backend and EGL device.
 
+    program_cache: whether linked programs are kept on disk; left out, they are unless GLSHADE_PROGRAM_CACHE is "0". The
+    window system's context (standalone) has no such cache.
     Errors: ContextError with what failed and what to do.
     """
     if backend not in BACKENDS:
         raise ContextError(f"unknown backend {backend!r}; allowed: {', '.join(BACKENDS)}")
+    cached = os.environ.get("GLSHADE_PROGRAM_CACHE") != "0" if program_cache is None else program_cache
     on_linux = sys.platform.startswith("linux")
     if backend == "egl" or (backend == "auto" and on_linux):
         try:
-            return _open_egl(device)
+            return _open_egl(device, cached)
         except ContextError as error:
             if backend == "egl" or device is not None:
                 raise
-            return _open_osmesa(instead_of=error)
+            return _open_osmesa(cached, instead_of=error)
     if backend == "osmesa":
         if device is not None:
             raise ContextError("only EGL has devices to choose from; leave --device out")
-        return _open_osmesa()
+        return _open_osmesa(cached)
     if device is not None:
         raise ContextError("only EGL has devices to choose from; leave --device out")
     try:
@@ -123,14 +136,15 @@ def open_context(backend: Backend = "auto", device: int | None = None) -> Contex
     return Context(gl, "standalone", lambda name: None)
 
 
-def _open_egl(device: int | None) -> Context:
+def _open_egl(device: int | None, cached: bool) -> Context:
     egl = load_egl()
     # glcontext wants a libGL to look symbols up in; EGL's own library serves, and bare machines have no libGL.
-    options: dict[str, Any] = {"backend": "egl", "libegl": LIBEGL, "libgl": LIBEGL, "require": REQUIRED_VERSION}
+    options: dict[str, Any] = {"mode": "standalone", "libegl": LIBEGL, "libgl": LIBEGL, "glversion": REQUIRED_VERSION}
     if device is not None:
         options["device_index"] = device
     try:
-        gl = moderngl.create_context(standalone=True, **options)
+        window = glcontext.get_backend_by_name("egl")(**options)
+        gl, linker = _made(window, "egl", cached)
     except Exception as error:
         if device is not None:
             count = len(devices())
@@ -144,10 +158,10 @@ def _open_egl(device: int | None) -> Context:
         address: int | None = egl.eglGetProcAddress(name.encode())
         return address
 
-    return Context(gl, "egl", procedure)
+    return Context(gl, "egl", procedure, linker)
 
 
-def _open_osmesa(instead_of: ContextError | None = None) -> Context:
+def _open_osmesa(cached: bool, instead_of: ContextError | None = None) -> Context:
     """instead_of: what is raised where OSMesa is not to be had either."""
     # EGL's context stays entangled with the thread; entering OSMesa afterwards crashes in the driver.
     if "egl" in _opened:
@@ -158,13 +172,26 @@ def _open_osmesa(instead_of: ContextError | None = None) -> Context:
         own = OSMesa(REQUIRED_VERSION)
     except ContextError as error:
         raise instead_of or error from None
-    settings: dict[str, Any] = {"context": own, "require": REQUIRED_VERSION}
     try:
-        gl = moderngl.create_context(standalone=True, **settings)
+        gl, linker = _made(own, "osmesa", cached)
     except Exception as error:
         raise ContextError(f"OSMesa gives no OpenGL {REQUIRED_VERSION / 100:.1f} context ({error})") from None
     _opened.add("osmesa")
-    return Context(gl, "osmesa", own.load_opengl_function)
+    return Context(gl, "osmesa", own.load_opengl_function, linker)
+
+
+def _made(window: Any, backend: str, cached: bool) -> tuple[moderngl.Context, Linker | None]:
+    """moderngl's context in the window, and the linker between them where there is one."""
+    linker = None
+    if cached:
+        from glshade.gl.binaries import Binaries
+        from glshade.gl.linker import Linker
+
+        linker = Linker(window, Binaries(), backend)
+        if not linker.offers_binaries:
+            linker = None
+    settings: dict[str, Any] = {"context": linker or window, "require": REQUIRED_VERSION}
+    return moderngl.create_context(standalone=True, **settings), linker
 
 
 def load_egl() -> ctypes.CDLL:

@@ -12,28 +12,39 @@ from numpy.typing import NDArray
 from glshade.gl.context import Context
 
 GL_RENDERBUFFER, GL_DEPTH_COMPONENT32F = 0x8D41, 0x8CAC
-Storage = Literal["rgba8", "rgba32f"]
-DTYPES: dict[Storage, tuple[str, Any]] = {"rgba8": ("f1", np.uint8), "rgba32f": ("f4", np.float32)}
+Storage = Literal["rgba8", "rgb10_a2", "r11f_g11f_b10f", "rgba16f", "rgba32f"]
+# Internal formats (Khronos' registry, gl.xml) and their channels.
+FORMATS: dict[Storage, tuple[int, int]] = {
+    "rgba8": (0x8058, 4),
+    "rgb10_a2": (0x8059, 4),
+    "r11f_g11f_b10f": (0x8C3A, 3),
+    "rgba16f": (0x881A, 4),
+    "rgba32f": (0x8814, 4),
+}
 
 
 class Frame:
     """A colour and a depth buffer of one size.
 
-    rgba8 for pictures to look at, drawn encoded; rgba32f for linear light. With several samples a pixel the colours are
-    averaged, in linear light, when they are read or passed on.
+    rgba8 for pictures to look at, drawn encoded; rgba32f for linear light, the others for what that loses in them. With several
+    samples a pixel the colours are averaged, in linear light, when they are read or passed on.
     """
 
     def __init__(self, context: Context, size: tuple[int, int], storage: Storage, samples: int = 1) -> None:
         gl = context.gl
         self.size, self.storage, self.samples = size, storage, samples
-        dtype, self.dtype = DTYPES[storage]
-        self.texture = gl.texture(size, 4, dtype=dtype)
+        format_, channels = FORMATS[storage]
+        dtype = "f1" if storage == "rgba8" else "f4"
+        self.texture = gl.texture(size, channels, dtype=dtype, internal_format=format_)
         self.texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
         several = 0 if samples == 1 else samples
         self._depth = gl.depth_renderbuffer(size, samples=several)
-        _make_float(context, self._depth.glo, size, several)
+        # 32 bits, where reversed depth has its digits; moderngl makes 24.
+        _store(context, self._depth.glo, GL_DEPTH_COMPONENT32F, size, several)
         self._resolved = gl.framebuffer([self.texture], self._depth if samples == 1 else None)
-        self._colour = None if samples == 1 else gl.renderbuffer(size, 4, samples=several, dtype=dtype)
+        self._colour = None if samples == 1 else gl.renderbuffer(size, channels, samples=several, dtype=dtype)
+        if self._colour is not None:
+            _store(context, self._colour.glo, format_, size, several)
         self.target = self._resolved if self._colour is None else gl.framebuffer([self._colour], self._depth)
         self._gl = gl
 
@@ -49,13 +60,13 @@ class Frame:
         return self.texture
 
     def readback(self, out: NDArray[Any]) -> None:
-        """Fills out (H, W, 4), of the storage's dtype and contiguous, row 0 at the top."""
+        """Fills out (H, W, 4), uint8 or float32 and contiguous, row 0 at the top."""
         self.resolve()
-        self._resolved.read_into(out, components=4, alignment=1, dtype=DTYPES[self.storage][0])
+        self._resolved.read_into(out, components=4, alignment=1, dtype="f1" if out.dtype == np.uint8 else "f4")
 
 
-def _make_float(context: Context, renderbuffer: int, size: tuple[int, int], samples: int) -> None:
-    """Gives a depth renderbuffer 32-bit float storage, where reversed depth has its digits; moderngl makes 24-bit ones."""
+def _store(context: Context, renderbuffer: int, format_: int, size: tuple[int, int], samples: int) -> None:
+    """Gives a renderbuffer storage of an internal format that moderngl has no name for."""
     bind = context.procedure("glBindRenderbuffer", None, ctypes.c_uint, ctypes.c_uint)
     # target, samples, format, width, height
     store = context.procedure(
@@ -63,4 +74,4 @@ def _make_float(context: Context, renderbuffer: int, size: tuple[int, int], samp
     )
     if bind is not None and store is not None:
         bind(GL_RENDERBUFFER, renderbuffer)
-        store(GL_RENDERBUFFER, samples, GL_DEPTH_COMPONENT32F, *size)
+        store(GL_RENDERBUFFER, samples, format_, *size)

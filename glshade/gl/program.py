@@ -19,6 +19,16 @@ _NVIDIA = re.compile(r"^\s*\d+\((?P<line>\d+)\)\s*:\s*(?P<message>.*)$")
 _OTHERS = re.compile(r"^\s*(?P<kind>ERROR|WARNING):\s*\d+:(?P<line>\d+):\s*(?P<message>.*)$")
 _HEADING = re.compile(r"^(vertex|fragment|geometry|compute)[ _]shader|^=+$|^GLSL Compiler failed|^GLSL Linker failed", re.I)
 
+# Khronos' registry values (gl.xml) of the types that uniforms and attributes may have.
+TYPES = {
+    **{0x1404: "int", 0x1405: "uint", 0x1406: "float", 0x8B56: "bool"},
+    **{0x8B50: "vec2", 0x8B51: "vec3", 0x8B52: "vec4", 0x8B53: "ivec2", 0x8B54: "ivec3", 0x8B55: "ivec4"},
+    **{0x8DC6: "uvec2", 0x8DC7: "uvec3", 0x8DC8: "uvec4", 0x8B57: "bvec2", 0x8B58: "bvec3", 0x8B59: "bvec4"},
+    **{0x8B5A: "mat2", 0x8B5B: "mat3", 0x8B5C: "mat4", 0x8B65: "mat2x3", 0x8B66: "mat2x4", 0x8B67: "mat3x2"},
+    **{0x8B68: "mat3x4", 0x8B69: "mat4x2", 0x8B6A: "mat4x3", 0x8B5E: "sampler2D", 0x8B5F: "sampler3D"},
+    **{0x8B60: "samplerCube", 0x8B62: "sampler2DShadow", 0x8DC1: "sampler2DArray"},
+}
+
 
 def rewrite(log: str, stage: Stage) -> list[str]:
     """The driver's messages, each as `file:line:column: message` (no column where the driver gives none)."""
@@ -38,17 +48,31 @@ def rewrite(log: str, stage: Stage) -> list[str]:
 
 
 class Program:
-    """A linked program. uniforms: the active ones by GLSL name; writing an unknown one is an error of ours."""
+    """A linked program. uniforms, attributes: the names of the active ones; blocks: of the uniform blocks."""
 
     def __init__(self, context: Context, source: Source, varyings: tuple[str, ...] = ()) -> None:
         try:
             fragment = source.fragment.text if source.fragment else None
-            self.gl = context.gl.program(source.vertex.text, fragment, varyings=varyings)
+            if context.linker and not varyings:
+                self.gl = context.linker.program(context.gl, source.vertex.text, fragment)
+            else:
+                self.gl = context.gl.program(source.vertex.text, fragment, varyings=varyings)
         except moderngl.Error as error:
             raise ShaderError("\n".join(_explain(str(error), source))) from None
         self.members: dict[str, Any] = {name: self.gl[name] for name in self.gl}
         self.attributes = tuple(name for name, member in self.members.items() if isinstance(member, moderngl.Attribute))
         self.uniforms = tuple(name for name, member in self.members.items() if isinstance(member, moderngl.Uniform))
+        self.blocks = tuple(name for name, member in self.members.items() if isinstance(member, moderngl.UniformBlock))
+
+    @property
+    def interface(self) -> dict[str, dict[str, Any]]:
+        """What is active, ready for JSON: "attributes" and "uniforms" by name with their GLSL types, as in `vec3` or
+        `float[4]` (an array of one is told as no array), and "blocks" by name with their sizes [bytes]."""
+        return {
+            "attributes": {name: _type(self.members[name]) for name in self.attributes},
+            "uniforms": {name: _type(self.members[name]) for name in self.uniforms},
+            "blocks": {name: self.members[name].size for name in self.blocks},
+        }
 
     def write(self, name: str, value: NDArray[np.float32]) -> None:
         """Sets a float uniform or an array of them; a matrix (`u_to_from_from`) is turned to columns, as GL has them.
@@ -64,6 +88,12 @@ class Program:
         member = self.members.get(name)
         if member is not None:
             member.value = value
+
+
+def _type(member: Any) -> str:
+    """The GLSL type of a uniform or an attribute; a number where the table has none."""
+    name = TYPES.get(member.gl_type, f"{member.gl_type:#06x}")
+    return f"{name}[{member.array_length}]" if member.array_length > 1 else name
 
 
 def _explain(message: str, source: Source) -> list[str]:

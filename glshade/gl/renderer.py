@@ -5,8 +5,9 @@ from __future__ import annotations
 import sys
 import warnings
 from collections import OrderedDict
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from time import perf_counter
 from types import TracebackType
 from typing import Any, Literal, get_args
 
@@ -21,7 +22,7 @@ from glshade.clusters import facing
 from glshade.digest import digest
 from glshade.errors import SceneError
 from glshade.gl.context import Backend, Context, open_context
-from glshade.gl.frame import Frame, Storage
+from glshade.gl.frame import FORMATS, Frame, Storage
 from glshade.gl.program import Program
 from glshade.gl.textures import upload
 from glshade.gl.vertices import Vertices
@@ -29,6 +30,7 @@ from glshade.image import Image
 from glshade.plan import ProgramPlan, plan_instance
 from glshade.scene import Rate, Scene
 from glshade.source import PAGE, Source, expand, generate
+from glshade.texels import Texels
 from glshade.uniforms import (
     Values,
     ambient_radiance,
@@ -117,12 +119,46 @@ class Renderer:
             self.context.gl.gc()
             return self._render(scene, dtype, shading, tile)
 
+    def drawing(self, scene: Scene) -> Callable[[], float]:
+        """A function that draws the scene's linear picture once more and says how long that took [s].
+
+        By the clock on the wall, until the driver has finished: from the first clear to the last pixel, without assembling,
+        uploading and reading back. The first call draws once beforehand, because a first draw compiles. Pictures larger than
+        a tile are not for this. Errors: SceneError, ShaderError.
+        """
+        with self.context.gl:
+            prepared = self._prepare(scene, None, "linear")
+        film = scene.film
+        samples = min(film.samples, self.context.gl.max_samples)
+        passes = _sample_passes(film.samples, self.context.gl.max_samples)
+        background = _background(film.background, "linear")
+        whole = prepared.assembly.view.clip_from_world(self.context.zero_to_one)
+        warm = False
+
+        def draw() -> float:
+            nonlocal warm
+            with self.context.gl as gl:
+                # Frames are kept by the renderer, which may have let go of this one since.
+                frame = self._frame(film.size, _linear(prepared), samples)
+                for _ in range(1 if warm else 2):
+                    gl.finish()
+                    start = perf_counter()
+                    for dx, dy in passes:
+                        frame.begin(background)
+                        self._draw_all(prepared, rounded(window(whole, film.size, dx, dy, *film.size)))
+                    gl.finish()
+                    seconds = perf_counter() - start
+                warm = True
+            return seconds
+
+        return draw
+
     def _render(self, scene: Scene, dtype: DType, shading: Rate | None, tile: int | None) -> Image:
         film = scene.film
         passes = _sample_passes(film.samples, self.context.gl.max_samples)
         opaque = len(film.background) == 3
         # Drawn straight into 8 bits where nothing has to be averaged or added in linear light afterwards.
-        direct = dtype == "uint8" and film.samples == 1 and opaque and len(scene.objects) > 0
+        direct = dtype == "uint8" and film.samples == 1 and opaque and scene.quality.storage in (None, "auto")
         prepared = self._prepare(scene, shading, film.encoding if direct else "linear")
         if direct and any(draw.added or draw.plan.alpha == "blend" for draw in prepared.draws):
             direct = False
@@ -163,7 +199,7 @@ class Renderer:
     ) -> None:
         """Fills out (h, w, 4) with the window of the picture at `corner`."""
         film = prepared.scene.film
-        frame = self._frame(size, "rgba8" if direct else "rgba32f", min(film.samples, self.context.gl.max_samples))
+        frame = self._frame(size, "rgba8" if direct else _linear(prepared), min(film.samples, self.context.gl.max_samples))
         background = _background(film.background, film.encoding if direct else "linear")
         whole = prepared.assembly.view.clip_from_world(self.context.zero_to_one)
         total: NDArray[np.float32] | None = None
@@ -310,7 +346,7 @@ class Renderer:
             for name, value in (*values.items(), *lights.items()):
                 if not np.isfinite(value).all():
                     raise SceneError(f"{instance.name}: {name.removeprefix('u_')} is too large for float32")
-            samplers = [(name, self._texture(texture)) for name, texture in textures(here, instance.material).items()]
+            samplers = [(name, self._texture(wanted)) for name, wanted in textures(here, instance.material).items()]
             vertices = self._vertices.array(instance.mesh, program, order)
             page = [group[index] for group in pages if index < len(group)]
             yield Draw(instance, here, program, vertices, values, samplers, {} if index else lights, page, bool(index))
@@ -342,15 +378,10 @@ class Renderer:
             self._programs[source] = Program(self.context, source)
         return self._programs[source]
 
-    def _texture(self, texture: Any) -> moderngl.Texture:
-        key = (
-            texture.texture,
-            texture.texture.stat().st_mtime_ns,
-            texture.wrap,
-            getattr(texture, "encoding", "linear"),
-        )
+    def _texture(self, texels: Texels) -> moderngl.Texture:
+        key = (texels, texels.path.stat().st_mtime_ns)
         if key not in self._textures:
-            self._textures[key] = upload(self.context, texture)
+            self._textures[key] = upload(self.context, texels)
             if len(self._textures) > KEPT_TEXTURES:
                 self._textures.popitem(last=False)
         return self._textures[key]
@@ -383,6 +414,22 @@ def _references(arrays: list[NDArray[Any]]) -> list[int]:
 
 # What _references counts for an array that nobody else holds: it differs between versions of Python.
 FREE = _references([np.empty(0)])[0]
+
+
+def _linear(prepared: Prepared) -> Storage:
+    """What linear light is kept in. Errors: SceneError for one that has nothing below zero under a negative light."""
+    chosen = prepared.scene.quality.storage
+    if chosen is None or chosen == "auto":
+        return "rgba32f"
+    if chosen == "r11f_g11f_b10f" and any(light.is_negative for light in prepared.assembly.lights):
+        raise SceneError("quality.storage: r11f_g11f_b10f has nothing below zero, and a light of this scene is negative")
+    if FORMATS[chosen][1] == 3 and (len(prepared.scene.film.background) == 4 or _blends(prepared)):
+        raise SceneError(f"quality.storage: {chosen} has no alpha, which this scene asks for")
+    return chosen
+
+
+def _blends(prepared: Prepared) -> bool:
+    return any(draw.plan.alpha == "blend" for draw in prepared.draws)
 
 
 def _paged(plan: ProgramPlan) -> list[Any]:

@@ -5,22 +5,17 @@ from __future__ import annotations
 import ctypes
 
 import moderngl
-import numpy as np
 
-from glshade import image
 from glshade.gl.context import GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, Context
 from glshade.mipmap import levels
-from glshade.texture import NormalMap, Texture
+from glshade.texels import Texels
 
 WRAP = {"repeat": 0x2901, "clamp": 0x812F, "mirror": 0x8370}
 
 
-def upload(context: Context, texture: Texture | NormalMap) -> moderngl.Texture:
+def upload(context: Context, texels: Texels) -> moderngl.Texture:
     """The texture, trilinear, with its wrap modes. Errors: AssetError."""
-    encoding = "linear" if isinstance(texture, NormalMap) else texture.encoding
-    pixels, _ = image.read(texture.texture, encoding)
-    # GL's first row is v = 0, the bottom; a file's is the top.
-    chain = list(levels(np.ascontiguousarray(pixels[::-1])))
+    chain = list(levels(texels.read()))
     while max(chain[0].shape[:2]) > context.largest_side:
         chain.pop(0)
     height, width, _ = chain[0].shape
@@ -29,9 +24,9 @@ def upload(context: Context, texture: Texture | NormalMap) -> moderngl.Texture:
     for level, pixels in enumerate(chain[1:], 1):
         result.write(pixels.tobytes(), level=level)
     result.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-    result.repeat_x, result.repeat_y = (mode != "clamp" for mode in texture.wrap)
-    if "mirror" in texture.wrap:
-        _mirror(context, result, texture.wrap)
+    result.repeat_x, result.repeat_y = (mode != "clamp" for mode in texels.wrap)
+    if "mirror" in texels.wrap:
+        _mirror(context, result, texels.wrap)
     return result
 
 

@@ -30,6 +30,11 @@ class Light(Document):
     # A light without a direction adds `ambient reflectance x intensity`, and has no illuminate().
     omnidirectional: ClassVar[bool] = False
 
+    @property
+    def is_negative(self) -> bool:
+        """Whether it takes light away in some channel."""
+        return min(c * self.intensity for c in self.colour) < 0
+
     @classmethod
     def fields(cls) -> dict[str, str]:
         """The GLSL struct's fields in their order: name -> vec3 or float."""

@@ -31,7 +31,6 @@ from glshade.reference.shade import (
     surface_at,
     toward_viewer,
 )
-from glshade.reference.texturing import Sampler
 
 Array = NDArray[Any]
 
@@ -49,6 +48,9 @@ FLUSHED = 1e-30
 LEVELS = 9
 # ... and a place in a texture between the ends of its error.
 SHIFTS = 5
+# Where light bends by more than this share of its range over a normal's box, it is looked at in LEVELS places along each
+# diagonal, not in corners alone.
+BENT = 0.1
 # An edge is near a pixel's centre within this [pixels]: the margin of coverage, and the steps that its corners are snapped by.
 NEAR = (MARGIN + 2) / SUBPIXELS
 # Lower than this [pixels] a triangle may turn over when its corners are snapped, by half a step each, or a whole one.
@@ -327,9 +329,8 @@ def _errors(draw: Draw, fragments: Fragments, surface: Surface, planes: _Planes,
     if corner.uv is not None and surface.footprint is not None:
         # Within a texture the place is known to float32 steps of its whole side: wrapped, scaled and less half a texel.
         found["uv"] = planes.errors(corner.uv[place], 4 * U)
-        samplers = _samplers(draw)
         if driver.texel:
-            largest = max(1 / min(s.widths[0], s.heights[0]) for s in samplers)
+            largest = max(1 / s.size.min() for s in draw.pictures)
             found["uv"] = found["uv"] + driver.texel * largest
         found["level"] = _levels(draw, fragments, surface, planes.size, driver)
     if corner.colour is not None:
@@ -420,7 +421,19 @@ def _spread(draw: Draw, evaluate: Callable[..., Array], surface: Surface, errors
             there.append(evaluate(draw, turned, material))
             if number in (1, 6):
                 rounding = np.maximum(rounding, np.abs(evaluate(draw, _narrow(turned)) - there[-1]))
-        reaches(there)
+        low, high = np.minimum.reduce(there), np.maximum.reduce(there)
+        # Where opposite corners are not about as far to either side, a peak or a horizon lies within.
+        bend = np.maximum.reduce([np.abs(there[k] + there[7 - k] - 2 * value) for k in range(4)])
+        wide = np.flatnonzero((bend > BENT * (high - low) + FLUSHED).any(axis=1))
+        if len(wide):
+            some, error = _some(surface, wide), errors.normal[wide]
+            for signs in product((1.0,), (-1.0, 1.0), (-1.0, 1.0)):
+                shifts = _spaced(-error, error, LEVELS)
+                along = [evaluate(draw, replace(some, normal=some.normal + np.array(signs) * shift)) for shift in shifts]
+                margin = _between(along)
+                low[wide] = np.minimum(low[wide], np.minimum.reduce(along) - margin)
+                high[wide] = np.maximum(high[wide], np.maximum.reduce(along) + margin)
+        reaches([low, high])
     for name in ("position", "tangent"):
         error = getattr(errors, name)
         for axis in range(0 if error is None else error.shape[1]):
@@ -477,7 +490,7 @@ def _levels(
     formula has derivatives.
     """
     assert surface.footprint is not None
-    samplers = _samplers(draw)
+    samplers = draw.pictures
     exact = [sampler.level(*surface.footprint) for sampler in samplers]
     if max(level.max(initial=-np.inf) for level in exact) < -1:
         return None
@@ -498,6 +511,17 @@ def _levels(
     return least - driver.level, most + driver.level
 
 
+def _some(surface: Surface, which: NDArray[np.intp]) -> Surface:
+    """The surface at some of its points."""
+
+    def take(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(map(take, value))
+        return value[which] if isinstance(value, np.ndarray) else value
+
+    return replace(surface, **{f.name: take(getattr(surface, f.name)) for f in fields(surface)})
+
+
 def _moved(surface: Surface, name: str, axis: int, by: Array) -> Surface:
     values = getattr(surface, name).copy()
     values[:, axis] += by
@@ -515,10 +539,6 @@ def _between(samples: list[Array]) -> Array:
     s = np.stack(samples)
     bend: Array = np.abs(s[2:] - 2 * s[1:-1] + s[:-2]).max(axis=0)
     return bend / 2
-
-
-def _samplers(draw: Draw) -> list[Sampler]:
-    return [*draw.samplers.values(), *([draw.normal_map] if draw.normal_map else [])]
 
 
 def _narrow(surface: Surface) -> Surface:

@@ -22,8 +22,9 @@ from glshade.lights import Falloff, Light
 from glshade.plan import ProgramPlan, plan_instance
 from glshade.reference.texturing import Sampler
 from glshade.scene import Rate, Scene
-from glshade.texture import NormalMap, Texture
-from glshade.uniforms import ambient_intensity, light_values, normal_matrix, object_uniforms, rounded
+from glshade.texels import Texels, texels
+from glshade.texture import CHANNELS, DirectionMap, Texture
+from glshade.uniforms import ambient_intensity, direction, light_values, normal_matrix, object_uniforms, rounded
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -49,7 +50,9 @@ class Draw:
     triangles (T, 3): vertex numbers in the order of drawing. world_from_object (4, 4): to positions relative to the eye.
     normal_from_object (3, 3). clip_from_world (4, 4), y downward, depth reversed, z in [0, w]. viewer (3,): v of an
     orthographic view, None in perspective. parameters: name -> (3,) or (), a texture's factor; samplers: their textures, by
-    the same names. ambient (3,). alpha: what the base texture's and the vertex colours' alpha multiply.
+    the same names; channels: of those that are numbers, 0 to 3. normal_map: a bump map's normals too. directions: of tangents,
+    by a map; turn (2,): cos and sin of the angle by which they are turned. ambient (3,). alpha: what the base texture's and the
+    vertex colours' alpha multiply.
     """
 
     instance: Instance
@@ -62,8 +65,11 @@ class Draw:
     ambient: Array
     parameters: dict[str, Array]
     samplers: dict[str, Sampler]
+    channels: dict[str, int]
     normal_map: Sampler | None
     normal_scale: float
+    directions: Sampler | None
+    turn: Array
     alpha: float
     alpha_cutoff: float
 
@@ -86,6 +92,11 @@ class Draw:
     def tangents(self) -> bool:
         """Whether the shading frame is turned by the mesh's tangents."""
         return self.model.anisotropic or self.normal_map is not None
+
+    @property
+    def pictures(self) -> list[Sampler]:
+        """All that is read at texture coordinates."""
+        return [*self.samplers.values(), *(s for s in (self.normal_map, self.directions) if s is not None)]
 
     @cached_property
     def clip(self) -> Array:
@@ -115,9 +126,15 @@ def prepare(scene: Scene, shading: Rate | None = None) -> Inputs:
     background = _wide([*(c * alpha for c in colour[:3]), alpha])
     width, height = scene.film.size
     clip = _wide(window(assembly.view.clip_from_world(zero_to_one=True), (width, height), 0, 0, width, height))
-    samplers: dict[Any, Sampler] = {}
+    samplers: dict[Texels, Sampler] = {}
     draws = (_draw(scene, assembly, plan, instance, clip, samplers) for plan, instance in _in_order(assembly))
     return Inputs((width, height), background, tuple(draws))
+
+
+def draw_of(scene: Scene, assembly: Assembly, instance: Instance) -> Draw:
+    """One instance as the GPU would be given it. Errors: AssetError."""
+    clip = _wide(assembly.view.clip_from_world(zero_to_one=True))
+    return _draw(scene, assembly, plan_instance(instance, assembly, "linear"), instance, clip, {})
 
 
 def _wide(value: Any) -> Array:
@@ -145,18 +162,20 @@ def _in_order(assembly: Assembly) -> Iterator[tuple[ProgramPlan, Instance]]:
 
 
 def _draw(
-    scene: Scene, assembly: Assembly, plan: ProgramPlan, instance: Instance, clip: Array, samplers: dict[Any, Sampler]
+    scene: Scene, assembly: Assembly, plan: ProgramPlan, instance: Instance, clip: Array, samplers: dict[Texels, Sampler]
 ) -> Draw:
     view, material = assembly.view, instance.material
     uploaded = object_uniforms(plan, instance, view.eye)
     normal = uploaded.get("u_normal_from_object")
-    parameters, textures = {}, {}
+    parameters, textures, channels = {}, {}, {}
     for name, declared in type(material).parameters().items():
-        value = getattr(material, name)
+        value, place = getattr(material, name), name
         if value is None and declared.same_as is not None:
-            value = getattr(material, declared.same_as)
+            place = declared.same_as
+            value = getattr(material, place)
         if isinstance(value, Texture):
-            textures[name] = _sampler(value, samplers)
+            textures[name] = _sampler(texels(material, place), samplers)
+            channels[name] = CHANNELS.index(value.channel or CHANNELS[0])
             value = value.factor if type(material).is_colour(name) else value.factor[0]
         parameters[name] = _wide(value)
     chosen = [assembly.lights[i] for i in instance.lights]
@@ -171,7 +190,10 @@ def _draw(
         centroids = instance.mesh.positions[triangles].mean(axis=1, dtype=np.float64)
         world = centroids @ instance.world_from_object[:3, :3].T + instance.world_from_object[:3, 3]
         triangles = triangles[np.argsort(-view.depth(world), kind="stable")]
-    bumps = material.normal_map
+    bumps, scale = ("normal_map", material.normal_map.scale) if material.normal_map else (None, 1.0)
+    if material.bump_map:
+        bumps, scale = "bump_map", material.bump_map.height
+    by_map = isinstance(material.tangent_direction, DirectionMap)
     return Draw(
         instance=instance,
         triangles=triangles,
@@ -183,16 +205,17 @@ def _draw(
         ambient=_wide(ambient_intensity(assembly, instance.lights, scene.film.exposure)),
         parameters=parameters,
         samplers=textures,
-        normal_map=None if bumps is None else _sampler(bumps, samplers),
-        normal_scale=1.0 if bumps is None else float(rounded(bumps.scale)),
+        channels=channels,
+        normal_map=_sampler(texels(material, bumps), samplers) if bumps else None,
+        normal_scale=float(rounded(scale)),
+        directions=_sampler(texels(material, "tangent_direction"), samplers) if by_map else None,
+        turn=_wide(direction(material)),
         alpha=float(rounded(material.alpha)),
         alpha_cutoff=float(rounded(material.alpha_cutoff)),
     )
 
 
-def _sampler(texture: Texture | NormalMap, kept: dict[Any, Sampler]) -> Sampler:
-    encoding = texture.encoding if isinstance(texture, Texture) else "linear"
-    key = (texture.texture, texture.wrap, encoding)
-    if key not in kept:
-        kept[key] = Sampler.load(texture.texture, encoding, texture.wrap)
-    return kept[key]
+def _sampler(given: Texels, kept: dict[Texels, Sampler]) -> Sampler:
+    if given not in kept:
+        kept[given] = Sampler.load(given)
+    return kept[given]

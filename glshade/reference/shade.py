@@ -24,6 +24,8 @@ Array = NDArray[Any]
 PIECE = 1 << 15
 # As in the shaders: how far above the horizon of n an interpolated normal leaves the viewer.
 HORIZON = 1e-3
+# ... and how long the direction of a map has to be.
+NO_DIRECTION = 0.01
 
 
 @dataclass(frozen=True)
@@ -166,7 +168,7 @@ def surface_at(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling
     """The surface at fragments, interpolated."""
     triangle = fragments.triangle
     x, y = places(fragments, size, sampling)
-    textured = bool(draw.samplers) or draw.normal_map is not None
+    textured = bool(draw.pictures)
     weight = weights(draw, triangle, x, y, size, derivatives=textured)
     vertices, place = np.unique(draw.triangles[triangle], return_inverse=True)
     corner = at_vertices(draw, vertices, sampling.dtype)
@@ -215,7 +217,9 @@ def material_of(draw: Draw, surface: Surface) -> SimpleNamespace:
         colour = draw.model.is_colour(name)
         if name in draw.samplers:
             texel = _sampled(draw.samplers[name], surface)
-            value = value * (texel[:, :3] if colour else texel[:, 0])
+            value = value * (texel[:, :3] if colour else texel[:, draw.channels[name]])
+            # A texel beyond what a parameter may be counts as the nearest that it may.
+            value = np.clip(value, value.dtype.type(declared.low), declared.high and value.dtype.type(declared.high))
         # A parameter that equals the surface's own colour equals it with its vertex colours.
         tinted = declared.base or _stands_for_base(draw, name)
         if tinted and surface.colour is not None:
@@ -244,7 +248,17 @@ def _frame(draw: Draw, surface: Surface) -> tuple[Array, Array, Array]:
         n = _unit(draw.normal_scale * (x * t + y * b) + z * n)
         t = _unit(_without(t, n))
         b = _unit(_without(_without(b, n), t))
-    return t, b, n
+    if draw.directions is not None:
+        d = 2 * _sampled(draw.directions, surface)[:, :2] - 1
+        along = np.array([1.0, 0.0], dtype=d.dtype)
+        t, b = _turned(t, b, _unit(np.where(np.linalg.norm(d, axis=1, keepdims=True) > NO_DIRECTION, d, along)))
+    return (*_turned(t, b, draw.turn.astype(t.dtype)[None]), n)
+
+
+def _turned(t: Array, b: Array, direction: Array) -> tuple[Array, Array]:
+    """t, b (N, 3) turned about their normal; direction (N or 1, 2): cos and sin, from t toward b."""
+    cos, sin = direction[:, :1], direction[:, 1:]
+    return cos * t + sin * b, cos * b - sin * t
 
 
 def toward_viewer(draw: Draw, position: Array) -> Array:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade import image
 from glshade.mipmap import levels
+from glshade.texels import Texels
 from glshade.texture import WrapMode
 
 Array = NDArray[Any]
@@ -18,30 +17,42 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Sampler:
-    """A mip chain in one piece. texels (sum of H W, 4) float32; starts, widths, heights (L,): of the levels in it."""
+    """A mip chain in one piece. texels (sum of H W, 4) float32; starts, widths, heights (L,): of the levels in it. span: how
+    often the unit of texture coordinates goes into the texels, along u and v."""
 
     texels: NDArray[np.float32]
     starts: NDArray[np.intp]
     widths: NDArray[np.intp]
     heights: NDArray[np.intp]
     wrap: tuple[WrapMode, WrapMode]
+    span: tuple[int, int] = (1, 1)
 
     @classmethod
-    def load(cls, path: Path, encoding: Literal["auto", "srgb", "linear"], wrap: tuple[WrapMode, WrapMode]) -> Sampler:
-        """The picture file. Errors: AssetError."""
-        return cls.of(image.read(path, encoding)[0], wrap)
+    def load(cls, given: Texels) -> Sampler:
+        """What is uploaded. Errors: AssetError."""
+        return cls._of(given.read(), given.wrap, given.span)
 
     @classmethod
     def of(cls, pixels: NDArray[np.float32], wrap: tuple[WrapMode, WrapMode]) -> Sampler:
         """A picture (H, W, 4), row 0 at the top; v = 0 is its bottom."""
-        chain = list(levels(np.ascontiguousarray(pixels[::-1])))
+        return cls._of(np.ascontiguousarray(pixels[::-1]), wrap, (1, 1))
+
+    @classmethod
+    def _of(cls, pixels: NDArray[np.float32], wrap: tuple[WrapMode, WrapMode], span: tuple[int, int]) -> Sampler:
+        chain = list(levels(pixels))
         heights, widths = (np.array([level.shape[axis] for level in chain]) for axis in (0, 1))
         starts = np.concatenate([[0], np.cumsum(heights * widths)[:-1]])
-        return cls(np.concatenate([level.reshape(-1, 4) for level in chain]), starts, widths, heights, wrap)
+        return cls(np.concatenate([level.reshape(-1, 4) for level in chain]), starts, widths, heights, wrap, span)
+
+    @property
+    def size(self) -> NDArray[np.float64]:
+        """(2,): texels of the largest level to a unit of texture coordinates, u and v."""
+        result: NDArray[np.float64] = np.array([self.widths[0], self.heights[0]]) / np.array(self.span)
+        return result
 
     def level(self, dx: Array, dy: Array) -> Array:
         """lambda (N,): the level of detail where uv changes by dx and dy (N, 2) from pixel to pixel; eqs. 8.8 and 8.10."""
-        size = np.array([self.widths[0], self.heights[0]], dtype=dx.dtype)
+        size = self.size.astype(dx.dtype)
         longest = np.maximum(np.linalg.norm(dx * size, axis=1), np.linalg.norm(dy * size, axis=1))
         # 1e-30 texels a pixel: far below level 0, and the logarithm stays finite.
         result: Array = np.log2(np.maximum(longest, 1e-30))
@@ -64,7 +75,7 @@ class Sampler:
 
     def _bilinear(self, uv: Array, level: NDArray[np.intp]) -> Array:
         start, width, height = self.starts[level], self.widths[level], self.heights[level]
-        u, v = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
+        u, v = uv[:, 0] / self.span[0] * width - 0.5, uv[:, 1] / self.span[1] * height - 0.5
         left, below = np.floor(u), np.floor(v)
         s, t = (u - left)[:, None], (v - below)[:, None]
         columns = [_wrapped(left.astype(np.intp) + k, width, self.wrap[0]) for k in (0, 1)]

@@ -23,6 +23,16 @@ def test_what_a_context_says_of_itself(renderer: Renderer) -> None:
     assert context.procedure("glNoSuchFunctionAnywhere", None) is None or context.backend == "egl"
 
 
+def test_it_says_so_while_another_is_current(renderer: Renderer) -> None:
+    backend: Any = renderer.context.backend
+    first = open_context(backend)
+    second = open_context(backend)
+    second.release()
+    assert (first.renderer, first.version) == (renderer.context.renderer, renderer.context.version)
+    assert first.largest_side >= 4096
+    first.release()
+
+
 def test_devices_are_numbered() -> None:
     found = devices()
     assert [device.index for device in found] == list(range(len(found)))
@@ -68,6 +78,26 @@ def test_an_image_outlives_its_renderer() -> None:
     with Renderer() as renderer:
         image = renderer.render(SCENE)
     assert image.pixels.mean() > 0
+
+
+def test_the_program_cache_may_be_off(renderer: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    backend: Any = renderer.context.backend
+
+    def linker(program_cache: bool | None = None) -> bool:
+        context = open_context(backend, program_cache=program_cache)
+        context.release()
+        return context.linker is not None
+
+    monkeypatch.delenv("GLSHADE_PROGRAM_CACHE", raising=False)
+    on = linker()
+    assert not linker(program_cache=False)
+    monkeypatch.setenv("GLSHADE_PROGRAM_CACHE", "0")
+    assert not linker()
+    assert linker(program_cache=True) == on
+    monkeypatch.setenv("GLSHADE_PROGRAM_CACHE", "1")
+    assert linker() == on
+    monkeypatch.setenv("GLSHADE_PROGRAM_CACHE", "")
+    assert linker() == on
 
 
 def test_a_device_by_number(renderer: Renderer) -> None:

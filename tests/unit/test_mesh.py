@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from glshade import primitives
 from glshade.errors import AssetError
-from glshade.mesh import Mesh, _weld, brushed, face_normals, faceted, in_local_order, with_normals, with_tangents
+from glshade.mesh import Mesh, brushed, face_normals, faceted, in_local_order, weld, with_normals, with_tangents
 
 Array = np.ndarray[Any, Any]
 
@@ -383,6 +383,6 @@ def test_vertices_are_welded_by_exact_equality(seed: int) -> None:
     # A few values, both zeros, and neighbours of 1 in the last place: many rows are equal, many nearly so.
     values = np.array([0.0, -0.0, 1.0, np.nextafter(np.float32(1), np.float32(2)), -1.0, 1e-45], dtype=np.float32)
     p = values[rng.integers(0, len(values), size=(rng.integers(3, 400), 3))]
-    label = _weld(p)
+    label = weld(p)
     _, expected = np.unique(p + 0, axis=0, return_inverse=True)
     assert len(set(zip(label.tolist(), expected.reshape(-1).tolist(), strict=True))) == label.max() + 1 == expected.max() + 1

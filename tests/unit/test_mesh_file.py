@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glshade import formats, mesh_file
+from glshade import BRDFS, Image, formats, mesh_file
 from glshade.errors import AssetError
 from glshade.formats.polygon import triangulated
 from glshade.mesh import Mesh
@@ -222,6 +222,31 @@ def test_obj_materials_keep_their_exact_floats(tmp_path: Path) -> None:
     }
 
 
+@pytest.mark.parametrize("key", ["bump", "map_bump", "map_Bump"])
+def test_obj_bump_maps(tmp_path: Path, key: str) -> None:
+    """Heights, unless the picture is blue, as normals are; `norm` always has normals."""
+    text = f"mtllib a.mtl\n{TRIANGLE}usemtl a\nf 1 2 3\n"
+
+    def material(colour: list[int], statement: str) -> dict[str, Any]:
+        Image(np.full((2, 2, 3), colour, dtype=np.uint8)).save(tmp_path / "b.png")
+        written(tmp_path, "a.mtl", f"newmtl a\nKd 1 1 1\n{statement} b.png\n")
+        forget()
+        found = load(written(tmp_path, "a.obj", text)).parts[0].material
+        assert found is not None
+        BRDFS["lambert"].model_validate(found)
+        return found
+
+    path = str(tmp_path / "b.png")
+    heights, up = [90, 90, 90], [128, 128, 255]
+    assert material(heights, key)["bump_map"] == {"texture": path, "height": 0.05}
+    twice = {"texture": path, "height": 0.1, "wrap": ["clamp", "clamp"]}
+    assert material(heights, f"{key} -clamp on -bm 2.0")["bump_map"] == twice
+    assert material(up, f"{key} -bm 0.5")["normal_map"] == {"texture": path, "scale": 0.5}
+    assert material(heights, "norm")["normal_map"] == {"texture": path}
+    with pytest.warns(AssetWarning, match="-bm much' is not a number"):
+        assert material(heights, f"{key} -bm much")["bump_map"]["height"] == 0.05
+
+
 def test_obj_objects_are_parts(tmp_path: Path) -> None:
     text = TRIANGLE + "o left\nf 1 2 3\no right\ng x\nf 3 2 1\n"
     assert [part.name for part in load(written(tmp_path, "a.obj", text)).parts] == ["left", "right"]
@@ -391,8 +416,10 @@ def test_gltf_material_with_an_embedded_picture(tmp_path: Path) -> None:
             assert Path(texture).read_bytes() == PNG
             assert texture.endswith(".png")
         assert found == {
-            "brdf": "lambert",
+            "brdf": "ggx",
             "kd": {"factor": [0.5, 0.25, 1.0], "wrap": ["clamp", "mirror"]},
+            "metallic": 1.0,
+            "roughness": 1.0,
             "normal_map": {"scale": 0.5, "wrap": ["repeat", "repeat"]},
             "alpha_mode": "mask",
             "alpha": 0.75,
@@ -400,6 +427,87 @@ def test_gltf_material_with_an_embedded_picture(tmp_path: Path) -> None:
             "sides": "both",
         }
         forget()
+
+
+def gltf_material(tmp_path: Path, **given: Any) -> dict[str, Any]:
+    """What a glTF material becomes; texture 0 is a picture."""
+    header, blob = gltf({"POSITION": POSITIONS, "TEXCOORD_0": UVS}, materials=[{"name": "it", **given}])
+    header["images"] = [{"uri": "a.png"}]
+    header["textures"] = [{"source": 0}]
+    written(tmp_path, "a.png", PNG)
+    forget()
+    part = load(written(tmp_path, "a.glb", glb(header, blob))).parts[0]
+    assert part.material is not None
+    BRDFS[part.material["brdf"]].model_validate(part.material)
+    return part.material
+
+
+TEXTURE = {"index": 0}
+
+
+def test_gltf_metallic_and_roughness(tmp_path: Path) -> None:
+    assert gltf_material(tmp_path) == {"brdf": "ggx", "kd": [1.0, 1.0, 1.0], "metallic": 1.0, "roughness": 1.0}
+    plain = gltf_material(tmp_path, pbrMetallicRoughness={"metallicFactor": 0, "roughnessFactor": 0.25})
+    assert (plain["metallic"], plain["roughness"]) == (0.0, 0.25)
+    packed = gltf_material(
+        tmp_path,
+        pbrMetallicRoughness={"metallicRoughnessTexture": TEXTURE, "metallicFactor": 0.5, "baseColorTexture": TEXTURE},
+    )
+    picture = {"texture": str(tmp_path / "a.png"), "wrap": ["repeat", "repeat"]}
+    assert packed["kd"] == {**picture, "factor": [1.0, 1.0, 1.0]}
+    assert packed["metallic"] == {**picture, "factor": 0.5, "channel": "b"}
+    assert packed["roughness"] == {**picture, "factor": 1.0, "channel": "g"}
+    dielectric = gltf_material(tmp_path, pbrMetallicRoughness={"metallicRoughnessTexture": TEXTURE, "metallicFactor": 0})
+    assert dielectric["metallic"] == 0, "what is multiplied by 0 needs no picture"
+
+
+def test_gltf_textures_of_other_coordinates(tmp_path: Path) -> None:
+    other = {"index": 0, "texCoord": 1}
+    with pytest.warns(AssetWarning, match="metallic roughness uses other texture coordinates"):
+        found = gltf_material(tmp_path, pbrMetallicRoughness={"metallicRoughnessTexture": other, "baseColorTexture": TEXTURE})
+    assert (found["metallic"], found["roughness"]) == (1.0, 1.0)
+
+
+def test_gltf_reflectance_at_normal_incidence(tmp_path: Path) -> None:
+    assert gltf_material(tmp_path, extensions={"KHR_materials_ior": {"ior": 2.0}})["f0"] == pytest.approx([1 / 9] * 3)
+    assert gltf_material(tmp_path, extensions={"KHR_materials_ior": {}})["f0"] == pytest.approx([0.04] * 3)
+    tinted = {"KHR_materials_specular": {"specularColorFactor": [1, 0.5, 50]}}
+    assert gltf_material(tmp_path, extensions=tinted)["f0"] == pytest.approx([0.04, 0.02, 1.0])
+    tinted["KHR_materials_specular"]["specularColorTexture"] = TEXTURE  # type: ignore[assignment]
+    assert gltf_material(tmp_path, extensions=tinted)["f0"]["factor"] == pytest.approx([0.04, 0.02, 1.0])
+    with pytest.warns(AssetWarning, match="at normal incidence alone"):
+        weak = gltf_material(tmp_path, extensions={"KHR_materials_specular": {"specularFactor": 0.5}})
+    assert weak["f0"] == pytest.approx([0.02] * 3)
+    old = {"diffuseFactor": [0.8, 0.4, 0.2, 1], "specularFactor": [0.5, 0.25, 0], "glossinessFactor": 0.75}
+    glossy = gltf_material(tmp_path, extensions={"KHR_materials_pbrSpecularGlossiness": old})
+    assert glossy == {"brdf": "ggx", "kd": [0.4, 0.2, 0.1], "metallic": 0.0, "roughness": 0.25, "f0": [0.5, 0.25, 0.0]}
+
+
+def test_gltf_anisotropy(tmp_path: Path) -> None:
+    """The widths are the extension's: mix(alpha, 1, strength^2) along the tangent, alpha across."""
+    brushed = {"KHR_materials_anisotropy": {"anisotropyStrength": 0.5, "anisotropyRotation": np.pi / 6}}
+    found = gltf_material(tmp_path, pbrMetallicRoughness={"roughnessFactor": 0.6}, extensions=brushed)
+    assert found["tangent_direction"] == pytest.approx(30)
+    aspect = np.sqrt(1 - 0.9 * found["anisotropy"])
+    alpha = found["roughness"] ** 2
+    assert (alpha / aspect, alpha * aspect) == pytest.approx((0.36 + 0.64 * 0.25, 0.36))
+    brushed["KHR_materials_anisotropy"]["anisotropyTexture"] = TEXTURE  # type: ignore[assignment]
+    with pytest.warns(AssetWarning, match="KHR_materials_anisotropy is approximate"):
+        found = gltf_material(tmp_path, pbrMetallicRoughness={"roughnessFactor": 0.6}, extensions=brushed)
+    assert found["tangent_direction"]["rotate"] == pytest.approx(30)
+    assert found["anisotropy"]["channel"] == "b"
+    none = {"KHR_materials_anisotropy": {"anisotropyRotation": 1.0}}
+    assert "tangent_direction" not in gltf_material(tmp_path, extensions=none)
+
+
+def test_gltf_says_what_it_leaves_out(tmp_path: Path) -> None:
+    with pytest.warns(AssetWarning, match="material 'it': KHR_materials_clearcoat, emission, ambient occlusion not used"):
+        gltf_material(
+            tmp_path,
+            extensions={"KHR_materials_clearcoat": {"clearcoatFactor": 1}, "KHR_materials_ior": {}},
+            emissiveFactor=[0, 1, 0],
+            occlusionTexture=TEXTURE,
+        )
 
 
 def test_gltf_with_files_beside_it(tmp_path: Path) -> None:

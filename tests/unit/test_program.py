@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from glshade import Renderer, ShaderError
 from glshade.gl.context import Context
-from glshade.gl.program import Program, rewrite
+from glshade.gl.program import TYPES, Program, rewrite
 from glshade.source import Source, Stage
 
 STAGE = Stage("a\nb\nc\nd\n", (("x.glsl", 1), ("y.glsl", 7), ("y.glsl", 8), ("<surface>", 3)))
@@ -94,3 +95,70 @@ def test_uniforms_and_attributes(context: Context) -> None:
     # GL has columns first: the rows that NumPy has are its columns' entries.
     assert np.frombuffer(program.members["u_b_from_a"].read(), dtype=np.float32).reshape(4, 4).T.tolist() == matrix.tolist()
     assert program.members["u_x"].value == 0.5
+
+
+TYPED_VERTEX = """#version 330 core
+in vec2 a_p;
+in ivec3 a_i;
+in float a_unused;
+struct Lamp { vec3 l; float power[2]; };
+uniform Lamp u_lamps[2];
+uniform mat2x3 u_m;
+uniform uint u_n;
+uniform bool u_on;
+layout(std140) uniform page { Lamp u_many[8]; };
+out vec3 v_c;
+void main() {
+    v_c = u_lamps[0].l * u_lamps[1].power[1] + u_m * a_p + u_many[a_i.x].l * float(u_n);
+    gl_Position = vec4(a_p, u_on ? float(a_i.z) : u_many[a_i.y].power[0], 1.0);
+}
+"""
+TYPED_FRAGMENT = """#version 330 core
+in vec3 v_c;
+uniform sampler2D u_t[2];
+uniform samplerCube u_cube;
+uniform float u_weights[3];
+uniform vec4 u_dropped;
+out vec4 o;
+void main() {
+    o = texture(u_t[0], v_c.xy) + texture(u_t[1], v_c.yx) * u_weights[2] + texture(u_cube, v_c) * u_weights[0];
+}
+"""
+
+
+def test_the_interface_tells_glsl_types(context: Context) -> None:
+    source = Source(stage(TYPED_VERTEX, "v.vert"), stage(TYPED_FRAGMENT, "f.frag"))
+    # The second is what the first has left on disk, where programs are kept.
+    for program in (Program(context, source), Program(context, source)):
+        told = json.loads(json.dumps(program.interface))
+        assert told["attributes"] == {"a_p": "vec2", "a_i": "ivec3"}
+        # Of a structure, drivers drop what is unused or keep it all.
+        lamps = {name: type for name, type in told["uniforms"].items() if name.startswith("u_lamps")}
+        assert lamps.items() >= {"u_lamps[0].l": "vec3", "u_lamps[1].power": "float[2]"}.items()
+        assert {name: type for name, type in told["uniforms"].items() if name not in lamps} == {
+            "u_m": "mat2x3",
+            "u_n": "uint",
+            "u_on": "bool",
+            "u_t": "sampler2D[2]",
+            "u_cube": "samplerCube",
+            "u_weights": "float[3]",
+        }
+        # std140: a vec3 and two floats, each rounded up to 16 bytes, eight times.
+        assert told["blocks"] == {"page": 8 * 48}
+
+
+def test_the_types_are_those_of_the_registry(context: Context) -> None:
+    """One uniform of every type there is a name for."""
+    for number, name in TYPES.items():
+        sampler = "sampler" in name
+        size = "vec3(0.5)" if name in ("sampler3D", "samplerCube", "sampler2DShadow", "sampler2DArray") else "vec2(0.5)"
+        if sampler:
+            use = f"vec4(texture(u_x, {size}))"
+        elif name.startswith("mat"):
+            use = "vec4(u_x[0].x)"
+        else:
+            use = "vec4(u_x)" if name in ("int", "uint", "float", "bool") else "vec4(u_x.x)"
+        text = f"#version 330 core\nuniform {name} u_x;\nout vec4 o;\nvoid main() {{\n    o = {use};\n}}\n"
+        vertex = "#version 330 core\nvoid main() {\n    gl_Position = vec4(0.0);\n}\n"
+        program = Program(context, Source(stage(vertex, "v.vert"), stage(text, "f.frag")))
+        assert program.interface["uniforms"] == {"u_x": name}, hex(number)

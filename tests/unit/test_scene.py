@@ -103,7 +103,7 @@ def fault(**keys: Any) -> tuple[str, str]:
         ({"objects": [{}]}, "objects.0", "needs a mesh or a shape, and not both"),
         ({"objects": [{"shape": "spere"}]}, "objects.0.shape", "unknown type 'spere'; did you mean \"sphere\"?"),
         ({"objects": [{"shape": {"type": "torus", "minor": 1}}]}, "objects.0.shape.minor", "must be less than 1, not 1"),
-        ({"objects": [{**SPHERE, "material": "gold"}]}, "objects.0.material", 'no material is named "gold"; allowed: none'),
+        ({"objects": [{**SPHERE, "material": "glod"}]}, "objects.0.material", 'no material or preset is named "glod"; did you'),
         ({"objects": [{**SPHERE, "parent": "x"}]}, "objects.0.parent", 'no object is named "x"; allowed: none'),
         (
             {"objects": [{**SPHERE, "shading": "fong"}]},

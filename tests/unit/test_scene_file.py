@@ -92,7 +92,7 @@ def test_every_fault_has_its_file_and_key_path(kind: str, tmp_path: Path) -> Non
     assert problems(path) == (
         f"{path}: film.samples: 5 is not one of 1, 2, 4 or 8",
         f"{path}: materials.red.exponent: must be a number, not 'x'",
-        f'{path}: objects[0].material: no material is named "rde"; did you mean "red"?',
+        f'{path}: objects[0].material: no material or preset is named "rde"; did you mean "red"?',
     )
 
 

@@ -1,0 +1,35 @@
+#include "lib/cos_half.glsl"
+#include "lib/frame.glsl"
+#include "lib/fresnel.glsl"
+#include <ggx>
+#include <diffuse>
+
+// glTF 2.0, appendix B: kd (1 - metallic)/pi (1 - F) n.l + F D V n.l, F Schlick's of mix(f0, kd, metallic); D V as in
+// microfacet/ggx_*.glsl.
+struct Ggx {
+    vec3 kd;
+    vec3 f0;
+    float metallic;
+    float roughness;
+    float anisotropy;
+};
+
+vec3 brdf_cos(Ggx m, Frame f, vec3 l, vec3 v) {
+    float NoL = dot(f.n, l);
+    float NoV = dot(f.n, v);
+    vec3 H = l + v;
+    float H2 = dot(H, H);
+    float length_H = sqrt(H2);
+    vec3 h = H / max(length_H, 1e-6);
+    float LoH = cos_half(l, v, length_H);
+    vec3 f0 = mix(m.f0, m.kd, m.metallic);
+    float specular = ggx_cos(f, l, v, h, m.roughness, m.anisotropy);
+    // |H|^2 below 1e-12: l = -v to rounding, where no half vector is.
+    bool lit = NoL > 0.0 && NoV > 0.0;
+    return diffuse(m.kd * (1.0 - m.metallic), f0, LoH, lit ? NoL : 0.0) +
+           f_schlick(f0, LoH) * (lit && H2 > 1e-12 ? specular : 0.0);
+}
+
+vec3 ambient_reflectance(Ggx m) {
+    return m.kd;
+}

@@ -1,0 +1,55 @@
+#include "lib/arcsine.glsl"
+#include "lib/constants.glsl"
+#include "lib/cospow.glsl"
+#include "lib/frame.glsl"
+
+// Strauss 1990: (n.l (1 - m s) (1 - s^3) kd + max(r.v, 0)^(3 / (1 - s)) R C) / pi with smoothness s and metalness m; R, C below.
+// Shaders that pass cosines to the Fresnel and the geometric term, which take angles, turn them round (erratum).
+struct Strauss {
+    vec3 kd;
+    float smoothness;
+    float metalness;
+};
+
+// Strauss's constants, the first two less 1: 1.12 - angle / 90 degrees is KF + height, without its cancellation.
+const float KF = 0.12;
+const float KG = 0.01;
+const float KJ = 0.1;
+
+// The angle between d and n, and what is left of it to the horizon, over 90 degrees. Each from what is small where it is.
+vec2 angles(vec3 n, vec3 d) {
+    float cosine = max(dot(n, d), 0.0);
+    vec3 q = n - d;
+    bool low = cosine < 0.7;
+    float angle = 2.0 * INV_PI * arcsine(low ? cosine : 0.5 * sqrt(dot(q, q)));
+    return low ? vec2(1.0 - angle, angle) : vec2(2.0 * angle, 1.0 - 2.0 * angle);
+}
+
+float geometry(float height) {
+    float x = height + KG;
+    return height * (height + 2.0 * KG) / (x * x) * ((1.0 + KG) * (1.0 + KG) / (1.0 + 2.0 * KG));
+}
+
+vec3 brdf_cos(Strauss m, Frame f, vec3 l, vec3 v) {
+    float NoL = dot(f.n, l);
+    float NoV = dot(f.n, v);
+    float s = m.smoothness;
+    float smooth3 = s * s * s;
+    float diffuse = (1.0 - m.metalness * s) * (1.0 - s) * (1.0 + s + s * s) * NoL;
+    vec2 of_l = angles(f.n, l);
+    float x = of_l.y + KF;
+    float fresnel = of_l.x * (x + 1.0 + KF) / (x * x) * (KF * KF / (1.0 + 2.0 * KF));
+    float raised = fresnel * geometry(of_l.y) * geometry(angles(f.n, v).y);
+    float reflectivity = min(smooth3 + (smooth3 + KJ) * raised, 1.0);
+    // The exponent has its pole at s = 1.
+    float lobe = cospow(2.0 * NoV * f.n - v, l, 3.0 / max(1.0 - s, 3e-8)) * reflectivity;
+    // 1 + m (F - 1) (1 - kd) as a sum of what is not negative.
+    vec3 colour = m.kd * (m.metalness * (1.0 - fresnel)) + (1.0 - m.metalness + m.metalness * fresnel);
+    float lit = NoL > 0.0 && NoV > 0.0 ? INV_PI : 0.0;
+    return m.kd * (lit * diffuse) + colour * (lit * lobe);
+}
+
+vec3 ambient_reflectance(Strauss m) {
+    float s = m.smoothness;
+    return m.kd * ((1.0 - s) * (1.0 + s + s * s));
+}

@@ -1,0 +1,25 @@
+#include "lib/constants.glsl"
+#include "lib/frame.glsl"
+#include "lib/gaussian.glsl"
+
+// Duer 2006: (kd/pi + ks exp(-slope^2) / (4 pi alpha_x alpha_y (n.l) (n.v))) n.l.
+struct WardDuer {
+    vec3 kd;
+    vec3 ks;
+    float alpha_x;
+    float alpha_y;
+};
+
+vec3 brdf_cos(WardDuer m, Frame f, vec3 l, vec3 v) {
+    float NoL = dot(f.n, l);
+    float NoV = dot(f.n, v);
+    Gaussian g = gaussian(f, l + v, m.alpha_x, m.alpha_y);
+    float low = max(NoL, GRAZING) * max(NoV, GRAZING);
+    float specular = 0.25 / (low * m.alpha_x * m.alpha_y) * g.root * g.root;
+    float lit = NoL > 0.0 && NoV > 0.0 ? INV_PI * NoL : 0.0;
+    return m.kd * lit + m.ks * (lit * specular);
+}
+
+vec3 ambient_reflectance(WardDuer m) {
+    return m.kd;
+}

@@ -1,0 +1,461 @@
+"""What varies from place to place: heights, directions of tangents, channels, and a texture on any parameter of any model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from test_source import nothing_unused
+
+from glshade import BRDFS, Image, Mesh, Renderer, Scene, SceneError, explain, reference, verify
+from glshade.brdfs import Brdf
+from glshade.mutations import MutatedRenderer, Mutation
+from glshade.plan import ProgramPlan
+from glshade.scene import Rate
+from glshade.source import generate
+from glshade.texels import normals
+
+RATES: tuple[Rate, ...] = ("flat", "gouraud", "phong")
+FRONT: dict[str, Any] = {"type": "orthographic", "eye": [0, 0, 5], "target": [0, 0, 0], "height": 2}
+SUN = {"type": "directional", "direction": [-0.3, -0.5, -1]}
+LIGHTS = [SUN, {"type": "point", "position": [1, 3, 2], "intensity": 0.7}, {"type": "ambient", "intensity": 0.1}]
+# From a lamp in the middle of the picture to the horizon: textures are magnified in front and minified behind.
+FLOOR = {"type": "perspective", "eye": [0.4, 0.6, 2.2], "target": [0, 0, 0], "fov": 50}
+ROUNDING = 2e-6
+
+Save = Callable[..., str]
+
+
+@pytest.fixture(scope="session")
+def picture(tmp_path_factory: pytest.TempPathFactory) -> Save:
+    """`picture(name, array)` saves linear values without loss, row 0 at the top, and says where."""
+    folder = tmp_path_factory.mktemp("pictures")
+
+    def save(name: str, pixels: Any) -> str:
+        pixels = np.asarray(pixels, dtype=np.float32)
+        path = folder / f"{name}.exr"
+        Image(np.repeat(pixels[..., None], 3, axis=2) if pixels.ndim == 2 else pixels).save(path)
+        return str(path)
+
+    return save
+
+
+def grey(folder: Path, codes: Any) -> str:
+    """An 8-bit picture of these codes."""
+    pixels = np.asarray(codes, dtype=np.uint8)
+    path = folder / "grey.png"
+    Image(np.repeat(pixels[..., None], 3, axis=2) if pixels.ndim == 2 else pixels).save(path)
+    return str(path)
+
+
+def noise(shape: tuple[int, ...], low: float = 0.0, high: float = 1.0, seed: int = 0) -> Any:
+    return np.random.default_rng(seed).uniform(low, high, shape)
+
+
+def square(material: dict[str, Any], uvs: Any = ((0, 0), (1, 0), (1, 1), (0, 1))) -> dict[str, Any]:
+    """A square that fills the picture seen from the front."""
+    corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float)
+    mesh = Mesh.build(corners, np.array([[0, 1, 2], [0, 2, 3]]), uvs=np.array(uvs, dtype=float))
+    return {"mesh": mesh, "material": material}
+
+
+def floor(material: Any, rate: Rate, size: int = 48) -> Scene:
+    """A tiled floor without a silhouette."""
+    shape = {"type": "plane", "segments": 12}
+    item = {"shape": shape, "sides": "both", "transform": {"scale": 8}, "shading": rate, "material": material}
+    film = {"size": (size, size)}
+    return Scene.model_validate({"film": film, "camera": FLOOR, "objects": [item], "lights": LIGHTS})
+
+
+def program(material: Any, **keys: Any) -> ProgramPlan:
+    item = {"shape": "sphere", "material": material, **keys}
+    (found,) = explain(Scene.model_validate({"objects": [item], "lights": [SUN]})).programs
+    return found
+
+
+def text(plan: ProgramPlan) -> str:
+    found = generate(plan)
+    assert found.fragment is not None
+    return found.vertex.text + found.fragment.text
+
+
+def fault(material: dict[str, Any]) -> str:
+    with pytest.raises(ValidationError) as caught:
+        Scene.model_validate({"objects": [{"shape": "sphere", "material": material}]})
+    (found,) = caught.value.errors()
+    return f"{'.'.join(map(str, found['loc']))}: {found['msg']}"
+
+
+class TestHeights:
+    """Bump maps."""
+
+    def lit(self, draw: Any, bumps: dict[str, Any], light: Any, size: int = 32, **more: Any) -> Any:
+        lights = [{"type": "directional", "direction": [-c for c in light]}]
+        return draw(square({"brdf": "lambert", "kd": 1, "bump_map": bumps}, **more), lights, (size, size), camera=FRONT)[..., 0]
+
+    @pytest.mark.parametrize("rate", RATES)
+    @pytest.mark.parametrize("axis", [0, 1])
+    def test_a_slope_is_a_tilted_plane(self, axis: int, rate: Rate, draw: Any, picture: Save) -> None:
+        """0.5 high over the width: n = (-0.5, 0, 1) or (0, -0.5, 1), made unit; v runs upward, rows of a file downward."""
+        along_u, along_v = np.meshgrid(np.arange(16) / 16, np.arange(16)[::-1] / 16)
+        path = picture(f"slope{axis}", (along_u, along_v)[axis])
+        tilt = np.array([-0.5, 0.0, 1.0] if axis == 0 else [0.0, -0.5, 1.0]) / math.hypot(0.5, 1)
+        # Away from the border, which is level.
+        uvs = ((0.25, 0.25), (0.75, 0.25), (0.75, 0.75), (0.25, 0.75))
+        item = square({"brdf": "lambert", "kd": 1, "bump_map": {"texture": path, "height": 0.5, "wrap": "clamp"}}, uvs)
+        for light in (tilt, (0.6, 0.0, 0.8), (0.0, -0.6, 0.8)):
+            lights = [{"type": "directional", "direction": [-c for c in light]}]
+            pixels = draw(item, lights, (32, 32), camera=FRONT, shading=rate)[..., 0]
+            assert pixels == pytest.approx(float(np.dot(tilt, light)), abs=ROUNDING)
+
+    def test_texels_are_square(self, picture: Save) -> None:
+        """A picture twice as wide as high has the same slopes across and upward."""
+        z = np.add.outer(np.arange(8), np.arange(16)) / 16.0
+        n = normals(z.astype(np.float32), ("repeat", "repeat"))[3, 5]
+        assert n == pytest.approx([0, 0, 1, 1])
+
+    def test_white_stands_out(self, draw: Any, picture: Save) -> None:
+        """A hill is bright on the side of the light; a pit on the other, and so is a hill of negative height."""
+        y, x = np.mgrid[-1:1:64j, -1:1:64j]
+        hill = np.clip(1 - 2 * (x * x + y * y), 0, 1)
+        for heights, height, sign in ((hill, 0.2, 1), (1 - hill, 0.2, -1), (hill, -0.2, -1)):
+            pixels = self.lit(draw, {"texture": picture("hill", heights), "height": height}, (-0.6, 0, 0.8), 64)
+            assert sign * (pixels[:, 12:28].mean() - pixels[:, 36:52].mean()) > 0.1
+
+    def test_integer_files_are_read_as_they_are(self, draw: Any, tmp_path: Path, picture: Save) -> None:
+        codes = np.arange(0, 256, 16)[None].repeat(16, axis=0)
+        bumps = {"height": 0.3, "wrap": "clamp"}
+        encoded = self.lit(draw, {"texture": grey(tmp_path, codes), **bumps}, (-0.6, 0, 0.8))
+        linear = self.lit(draw, {"texture": picture("codes", codes / 255), **bumps}, (-0.6, 0, 0.8))
+        assert encoded == pytest.approx(linear, abs=ROUNDING)
+
+    def test_red_counts(self, draw: Any, picture: Save) -> None:
+        heights = noise((8, 8, 3))
+        one = self.lit(draw, {"texture": picture("rgb", heights)}, (-0.6, 0, 0.8))
+        other = self.lit(draw, {"texture": picture("red", heights[..., 0])}, (-0.6, 0, 0.8))
+        assert np.ptp(one) > 0.1
+        assert (one == other).all()
+
+    @pytest.mark.parametrize("wrap", ["repeat", "clamp", "mirror"])
+    def test_across_the_border(self, wrap: str) -> None:
+        z = np.array([[0.0, 1.0, 4.0, 6.0]], dtype=np.float32)
+        found = 1 - 2 * normals(z, (wrap, "repeat"))[0, :, 0]  # type: ignore[arg-type]
+        expected = {"repeat": [-10, 8, 10, -8], "clamp": [0, 8, 10, 0], "mirror": [2, 8, 10, 4, -4, -10, -8, -2]}[wrap]
+        assert found == pytest.approx(expected)
+
+    def test_one_texel_is_level(self) -> None:
+        for wrap in ("repeat", "clamp", "mirror"):
+            assert normals(np.ones((1, 1), dtype=np.float32), (wrap, wrap))[..., :2] == pytest.approx(0.5)  # type: ignore[arg-type]
+
+    @pytest.mark.parametrize("axis", [0, 1])
+    def test_a_mirrored_hill_is_a_hill(self, axis: int, draw: Any, picture: Save) -> None:
+        """As the picture beside its mirror image, which is drawn without mirrors: 2 x 2 of it, off the origin."""
+        heights = noise((8, 8))
+        flipped = np.flip(heights, 1 - axis)
+        # Rows of a file run downward: the picture itself is the lower half.
+        both = np.concatenate([heights, flipped], 1) if axis == 0 else np.concatenate([flipped, heights], 0)
+        wrap = ["mirror", "repeat"] if axis == 0 else ["repeat", "mirror"]
+        uvs = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * 4.0 - 1.25
+        # Half as high in widths of a picture that is twice as wide.
+        height = 0.05 if axis == 0 else 0.1
+        mirrored = {"texture": picture("single", heights), "height": 0.1, "wrap": wrap}
+        one = self.lit(draw, mirrored, (-0.5, 0.3, 0.8), 64, uvs=uvs)
+        halved = uvs / np.array([2, 1] if axis == 0 else [1, 2])
+        other = self.lit(draw, {"texture": picture("double", both), "height": height}, (-0.5, 0.3, 0.8), 64, uvs=halved)
+        assert np.ptp(one) > 0.2
+        assert one == pytest.approx(other, abs=10 * ROUNDING)
+
+    def test_from_afar_it_is_the_mean_slope(self, draw: Any, picture: Save) -> None:
+        """Fine ripples on a slope: what is left of them is the slope."""
+        x = np.arange(256)
+        heights = (x / 256 + 0.01 * (x % 2))[None].repeat(256, axis=0)
+        pixels = self.lit(draw, {"texture": picture("ripples", heights), "height": 0.5, "wrap": "clamp"}, (-0.6, 0, 0.8), 8)
+        assert pixels[2:-2, 2:-2] == pytest.approx((0.3 + 0.8) / math.hypot(0.5, 1), abs=1e-4)
+
+    def test_a_height_is_no_feature(self, picture: Save) -> None:
+        bumps = {"texture": picture("flat", noise((4, 4)))}
+        one, other = (program({"brdf": "phong", "bump_map": {**bumps, "height": h}}) for h in (0.1, 0.2))
+        assert one == other
+        assert one == program({"brdf": "phong", "normal_map": bumps}), "the same program as a normal map's"
+
+    def test_not_beside_a_normal_map(self, picture: Save) -> None:
+        bumps = {"texture": picture("flat", noise((4, 4)))}
+        message = fault({"brdf": "phong", "normal_map": bumps, "bump_map": bumps})
+        assert message == "objects.0.material.bump_map: not together with normal_map: each says which way the surface faces"
+        assert program({"brdf": "phong", "normal_map": None, "bump_map": bumps}).normal_map
+
+
+BRUSHED: dict[str, Any] = {"brdf": "ashikhmin_shirley", "ks": 0.5, "pu": 400.0, "pv": 10.0}
+LAMP = [{"type": "point", "position": [0.5, 0.25, 1], "falloff": "none"}]
+
+
+class TestDirections:
+    """The direction of anisotropy."""
+
+    def drawn(self, draw: Any, uvs: Any = ((0, 0), (1, 0), (1, 1), (0, 1)), **material: Any) -> Any:
+        return draw(square({**BRUSHED, **material}, uvs), LAMP, (32, 32), camera=FRONT)
+
+    def test_a_quarter_turn_exchanges_the_axes(self, draw: Any) -> None:
+        turned = self.drawn(draw, tangent_direction=90)
+        assert turned == pytest.approx(self.drawn(draw, pu=10.0, pv=400.0), abs=ROUNDING)
+        assert np.abs(turned - self.drawn(draw)).max() > 0.1
+
+    @pytest.mark.parametrize("rate", RATES)
+    def test_it_turns_from_u_toward_v(self, rate: Rate, draw: Any) -> None:
+        """As the same surface with its texture coordinates turned, mirrored ones too."""
+        c, s = math.cos(math.radians(30)), math.sin(math.radians(30))
+        for mirror in (1, -1):
+            uvs = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) * [mirror, 1.0]
+            # u' grows along (c, s) and v' along (-s, c) of u, v.
+            turned = uvs @ np.array([[c, -s], [s, c]])
+            items = (
+                square({**BRUSHED, "tangent_direction": 30}, uvs),
+                square(BRUSHED, turned),
+            )
+            one, other = (draw(item, LAMP, (32, 32), camera=FRONT, shading=rate) for item in items)
+            assert one == pytest.approx(other, abs=4 * ROUNDING)
+            plain = draw(square(BRUSHED, uvs), LAMP, (32, 32), camera=FRONT, shading=rate)
+            assert np.abs(one - plain).max() > 1e-3
+
+    @pytest.mark.parametrize(("angle", "length"), [(0, 1.0), (50, 1.0), (-130, 0.3), (90, 0.02)])
+    def test_a_map_of_one_direction_is_an_angle(self, angle: float, length: float, draw: Any, picture: Save) -> None:
+        a = math.radians(angle)
+        rgb = [0.5 + 0.5 * length * math.cos(a), 0.5 + 0.5 * length * math.sin(a), 0.125]
+        path = picture("direction", np.broadcast_to(rgb, (2, 2, 3)))
+        mapped = self.drawn(draw, tangent_direction={"texture": path})
+        assert mapped == pytest.approx(self.drawn(draw, tangent_direction=angle), abs=1e-4)
+        rotated = self.drawn(draw, tangent_direction={"texture": path, "rotate": 25})
+        assert rotated == pytest.approx(self.drawn(draw, tangent_direction=angle + 25), abs=1e-4)
+
+    @pytest.mark.parametrize("code", [127, 128])
+    def test_no_direction_is_the_tangent(self, code: int, draw: Any, tmp_path: Path, picture: Save) -> None:
+        plain = self.drawn(draw)
+        for path in (grey(tmp_path, np.full((2, 2), code)), picture("half", np.full((3, 3), 0.5))):
+            assert self.drawn(draw, tangent_direction={"texture": path}) == pytest.approx(plain, abs=ROUNDING)
+            turned = self.drawn(draw, tangent_direction={"texture": path, "rotate": 90})
+            assert turned == pytest.approx(self.drawn(draw, pu=10.0, pv=400.0), abs=ROUNDING)
+
+    def test_it_bends_with_the_normal(self, draw: Any, picture: Save) -> None:
+        """Under a normal map as without: a quarter turn still exchanges the axes."""
+        bumps = {"texture": picture("bumps", noise((4, 4))), "height": 0.1}
+        turned = self.drawn(draw, bump_map=bumps, tangent_direction=90)
+        assert turned == pytest.approx(self.drawn(draw, bump_map=bumps, pu=10.0, pv=400.0), abs=4 * ROUNDING)
+
+    def test_no_turn_costs_nothing(self) -> None:
+        for angle in (0, 360, -720.0):
+            assert program({**BRUSHED, "tangent_direction": angle}) == program(BRUSHED)
+        one, other = (program({**BRUSHED, "tangent_direction": angle}) for angle in (30, 40))
+        assert one == other != program(BRUSHED)
+        assert not program({"brdf": "ggx", "anisotropy": 0, "tangent_direction": 30}).turned, "alike all round"
+
+    def test_only_where_there_is_a_direction(self) -> None:
+        expected = "objects.0.material.tangent_direction: phong is alike all round: it has no direction to turn"
+        assert fault({"brdf": "phong", "tangent_direction": 30}) == expected
+        for model in BRDFS.values():
+            material = {"brdf": model.model_fields["brdf"].default, "tangent_direction": 30}
+            if model.anisotropic:
+                model.model_validate(material)
+            else:
+                assert "alike all round" in fault(material)
+
+    def test_a_mesh_without_coordinates(self) -> None:
+        """An angle needs none; a map does, and so do heights."""
+        assert program({**BRUSHED, "tangent_direction": 30}, shape="icosphere").turned
+        for key in ("tangent_direction", "bump_map"):
+            item = {"shape": "icosphere", "material": {**BRUSHED, key: {"texture": __file__}}}
+            with pytest.raises(SceneError, match=f"{key} is a texture, but its mesh has no texture coordinates"):
+                explain(Scene.model_validate({"objects": [item]}))
+
+
+class TestChannels:
+    """Numbers from any channel."""
+
+    @pytest.mark.parametrize("channel", "rgba")
+    def test_each(self, channel: str, draw: Any, picture: Save) -> None:
+        path = picture("rgba", np.broadcast_to([1.0, 4.0, 16.0, 0.5], (2, 2, 4)))
+        material = {"brdf": "phong", "kd": 0, "ks": 1}
+        textured = {"texture": path, "channel": channel, "factor": 3}
+        item = square({**material, "exponent": textured})
+        scene = draw.scene(item, [SUN], camera=FRONT)
+        # An EXR's colours count as multiplied by alpha.
+        exponent = 3 * {"r": 2.0, "g": 8.0, "b": 32.0, "a": 0.5}[channel]
+        expected = draw(square({**material, "exponent": exponent}), [SUN], camera=FRONT)
+        assert draw(item, [SUN], camera=FRONT) == pytest.approx(expected, rel=1e-5)
+        assert reference.radiance(scene)[..., :3] == pytest.approx(expected, rel=1e-5)
+
+    def test_red_is_the_first_choice(self, picture: Save) -> None:
+        texture = {"texture": picture("rgb", noise((4, 4, 3)))}
+        one, other = (program({"brdf": "phong", "exponent": {**texture, **more}}) for more in ({}, {"channel": "r"}))
+        assert one == other
+
+    def test_not_of_a_colour(self, picture: Save) -> None:
+        message = fault({"brdf": "phong", "kd": {"texture": picture("rgb", noise((4, 4, 3))), "channel": "g"}})
+        assert message == 'objects.0.material.kd: a colour takes three channels, and cannot be told channel = "g"'
+
+    def test_a_picture_is_bound_once(self, picture: Save) -> None:
+        path = picture("rgb", noise((4, 4, 3)))
+        packed = {
+            "brdf": "ggx",
+            "roughness": {"texture": path, "channel": "g"},
+            "metallic": {"texture": path, "channel": "b", "factor": 0.5},
+        }
+        assert text(program(packed)).count("uniform sampler2D") == 1
+        # Another way to read it is another texture.
+        assert text(program({**packed, "metallic": {"texture": path, "wrap": "clamp"}})).count("uniform sampler2D") == 2
+
+    @pytest.mark.parametrize("rate", RATES)
+    def test_8_bits_are_numbers(self, rate: Rate, tmp_path: Path, renderer: Renderer) -> None:
+        """Neither renderer decodes what is no colour."""
+        pixels = (noise((4, 4, 3)) * 255).astype(np.uint8)
+        path = grey(tmp_path, pixels)
+        material = {"brdf": "phong", "ks": 1, "exponent": {"texture": path, "factor": 40, "channel": "g"}}
+        assert verify(floor(material, rate), renderer=renderer).verdict == "verified"
+
+
+def test_every_feature_has_a_name(picture: Save) -> None:
+    path = picture("rgb", noise((4, 4, 3)))
+    material = {
+        "brdf": "ggx",
+        "anisotropy": 0.5,
+        "roughness": {"texture": path, "channel": "g"},
+        "bump_map": {"texture": path, "wrap": "mirror"},
+        "tangent_direction": {"texture": path, "rotate": 30},
+    }
+    found = explain(Scene.model_validate({"objects": [{"name": "ball", "shape": "sphere", "material": material}]}))
+    reasons = dict(found.reasons)
+    assert reasons["bump map"] == reasons["directions of tangents"] == reasons["texture of roughness"] == "ball"
+    assert reasons["tangents turned"] == "ball, by 30 degrees"
+    (plan,) = found.programs
+    for words in ("roughness textured (g)", "normal map (mirrored)", "tangents by a map", "tangents turned"):
+        assert words in str(plan)
+    everything, nothing = text(plan), text(program({"brdf": "ggx", "anisotropy": 0.5}))
+    for word in ("turned_frame", "mapped_direction", "mapped_frame", "u_turn", "u_normal_map", "u_direction_map"):
+        assert word in everything
+        assert word not in nothing
+
+
+# Each feature against the float64 reference.
+FEATURES = {
+    "bumps": {"brdf": "phong", "bump_map": {"texture": "heights", "height": 0.2}},
+    "mirrored bumps": {"brdf": "phong", "bump_map": {"texture": "heights", "height": 0.2, "wrap": ["mirror", "clamp"]}},
+    "turned": {**BRUSHED, "tangent_direction": 33},
+    "directions": {**BRUSHED, "tangent_direction": {"texture": "circle", "rotate": 20}},
+    "directions and bumps": {
+        **BRUSHED,
+        "tangent_direction": {"texture": "circle", "wrap": "mirror"},
+        "bump_map": {"texture": "heights", "height": 0.1},
+    },
+    "packed": {
+        "brdf": "ggx",
+        "kd": {"texture": "noise"},
+        "roughness": {"texture": "noise", "channel": "g"},
+        "metallic": {"texture": "noise", "channel": "b"},
+        "anisotropy": {"texture": "noise", "channel": "r"},
+        "tangent_direction": 45,
+    },
+}
+
+
+def feature(name: str, picture: Save) -> dict[str, Any]:
+    """The material, with files in place of their names."""
+    y, x = np.mgrid[0:16, 0:16] - 7.5
+    files = {
+        "heights": picture("heights", noise((12, 16))),
+        "circle": picture("circle", 0.5 + 0.5 * np.stack([-y, x, 0 * x], -1) / np.hypot(x, y)[..., None]),
+        "noise": picture("noise", noise((8, 8, 3))),
+    }
+
+    def placed(value: Any) -> Any:
+        return {**value, "texture": files[value["texture"]]} if isinstance(value, dict) else value
+
+    return {key: placed(value) for key, value in FEATURES[name].items()}
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("name", FEATURES)
+def test_verified(name: str, rate: Rate, picture: Save, renderer: Renderer) -> None:
+    verdict = verify(floor(feature(name, picture), rate, 64), renderer=renderer)
+    assert verdict.verdict == "verified", str(verdict)
+    assert np.ptp(verdict.picture) > 0.05
+
+
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize("name", FEATURES)
+def test_what_is_declared_is_used(name: str, rate: Rate, picture: Save, renderer: Renderer) -> None:
+    for plan in explain(floor(feature(name, picture), rate)).programs:
+        nothing_unused(plan, renderer)
+
+
+@pytest.mark.parametrize(
+    ("name", "old", "new"),
+    [
+        ("turned", r"d\.x \* f\.b - d\.y", "d.x * f.b + d.y"),
+        ("turned", r"turned_frame\((tangent_frame\(.*?\)), u_turn\)", r"\1"),
+        ("directions", r"2\.0 \* rg - 1\.0", "2.0 * rg.yx - 1.0"),
+        ("directions", r"vec2 rg\) \{", "vec2 rg) { rg.y = 1.0 - rg.y;"),
+        ("bumps", r"scale \* m\.x", "scale * -m.x"),
+        ("bumps", r"scale \* m\.y", "1.01 * scale * m.y"),
+        ("mirrored bumps", r" / vec2\(2\.0, 1\.0\)", ""),
+        ("packed", r"\.g, ", ".r, "),
+        ("packed", r"(m\.metallic = .*?)\.b", r"\1.g"),
+    ],
+)
+def test_a_fault_is_found(name: str, old: str, new: str, picture: Save, faulty: MutatedRenderer) -> None:
+    faulty.mutation = Mutation("fault", "put in here", ((old, new),))
+    verdict = verify(floor(feature(name, picture), "phong"), renderer=faulty)
+    assert verdict.verdict == "failed"
+
+
+@pytest.fixture(scope="module")
+def faulty() -> Iterator[MutatedRenderer]:
+    with MutatedRenderer() as renderer:
+        yield renderer
+
+
+# Any parameter of any model.
+
+
+def middling(model: type[Brdf], name: str) -> float:
+    """The middle of a parameter's usual range, between the decades of a wide one; never 0, so that no lobe is left out."""
+    low, high = model.parameters()[name].usual
+    return math.sqrt(low * high) if low > 0 else (low + high) / 2 or high / 2
+
+
+def textured(model: type[Brdf], names: Any, picture: Save) -> dict[str, Any]:
+    """A material with a picture on each of the parameters, from end to end of its usual range; the others have one value."""
+    material: dict[str, Any] = {"brdf": model.model_fields["brdf"].default}
+    for seed, name in enumerate(model.parameters()):
+        if name not in names:
+            material[name] = middling(model, name)
+            continue
+        low, high = model.parameters()[name].usual
+        # The factor brings what lies within [-1, 1] to the range.
+        factor = max(abs(low), abs(high))
+        path = picture(f"{material['brdf']}-{name}", noise((4, 4, 3), low / factor, high / factor, seed))
+        material[name] = {"texture": path, "factor": factor} | ({} if model.is_colour(name) else {"channel": "rgb"[seed % 3]})
+    return material
+
+
+def check(name: str, names: Any, rate: Rate, picture: Save, renderer: Renderer) -> None:
+    scene = floor(textured(BRDFS[name], names, picture), rate)
+    (plan,) = explain(scene).programs
+    assert set(names) <= set(plan.textured), "its program does not read the textures"
+    verdict = verify(scene, renderer=renderer)
+    assert verdict.verdict == "verified", str(verdict)
+
+
+@pytest.mark.parametrize("name", BRDFS)
+def test_all_parameters_of_a_model_may_be_textures(name: str, picture: Save, renderer: Renderer) -> None:
+    check(name, BRDFS[name].parameters(), "phong", picture, renderer)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rate", RATES)
+@pytest.mark.parametrize(("name", "parameter"), [(name, p) for name in BRDFS for p in BRDFS[name].parameters()])
+def test_each_parameter_may_be_a_texture(name: str, parameter: str, rate: Rate, picture: Save, renderer: Renderer) -> None:
+    check(name, [parameter], rate, picture, renderer)
