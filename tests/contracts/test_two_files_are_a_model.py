@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import re
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,10 +15,11 @@ import glshade
 TOY = '''
 """toy: cos^2, for its own test."""
 from typing import Any, ClassVar, Literal
-from glshade.brdfs import Array, Brdf, Colour, Parameter, above_horizon, parameter
+from glshade.brdfs import Array, Brdf, Colour, Law, Parameter, above_horizon, parameter
 
 class Toy(Brdf):
     source: ClassVar[str] = "this test"
+    breaks: ClassVar[dict[Law, str]] = {"reciprocity": "one cosine too many", "energy": "2 pi/3 of it leaves a white one"}
     brdf: Literal["toy"] = "toy"
     tint: Colour = parameter((0.5, 0.5, 0.5), Parameter("strength", base=True))
 
@@ -66,6 +71,11 @@ vec3 illuminate(LampLight light, vec3 p, out vec3 l) {
     return light.intensity * (p.y - light.level);
 }
 """
+# The contracts that a model without options or limits has to keep.
+LAWS = {
+    *("test_finite_and_non_negative", "test_gpu_equals_reference", "test_reciprocity", "test_energy", "test_isotropy"),
+    *("test_zero_below_horizon", "test_parameters_agree", "test_extremes_conditioning", "test_extremes_horizon"),
+}
 USE = """
 import math, sys
 import numpy as np
@@ -89,6 +99,8 @@ with Renderer() as renderer:
     l, v = [0, 0.6, 0.8], [0, 0, 1]
     for on in ("reference", "vertex", "fragment"):
         assert np.allclose(evaluate(BRDFS["toy"](), l, v, on=on, context=renderer.context), 0.32, rtol=1e-6)
+    for rate in ("flat", "gouraud", "phong"):
+        assert glshade.verify(scene(3), renderer=renderer, shading=rate).verdict == "verified"
 print("found")
 """
 
@@ -102,6 +114,17 @@ def test_a_toy_model_and_a_toy_light_are_found_and_drawn(tmp_path: Path, python:
     (tmp_path / "glshade/lights/lamp.py").write_text(LAMP)
     (tmp_path / "shaders/light/lamp.glsl").write_text(LAMP_GLSL)
     assert python(USE, tmp_path, PYTHONPATH=str(tmp_path), cwd=tmp_path) == "found"
+    # Every law is put to it: the contracts run on what is found.
+    tests = Path(__file__).parent.parent
+    laws = [str(path) for path in sorted((tests / "contracts").glob("test_*.py")) if path.stem in LAWS]
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-m", "not slow", "-k", "toy"]
+    command += ["-c", str(tests.parent / "pyproject.toml"), *laws]
+    path = f"{tmp_path}{os.pathsep}{tests}"
+    environment = {**os.environ, "PYTHONPATH": path}
+    done = subprocess.run(command, capture_output=True, text=True, cwd=tmp_path, env=environment, check=False)
+    assert done.returncode == 0, done.stdout
+    assert int(re.search(r"(\d+) passed", done.stdout)[1]) >= len(LAWS), done.stdout  # type: ignore[index]
+    assert "failed" not in done.stdout
     # The schema tells the world.
     code = "import json; from glshade import Scene; s = json.dumps(Scene.model_json_schema()); print('tint' in s, 'lamp' in s)"
     assert python(code, PYTHONPATH=str(tmp_path), cwd=tmp_path) == "True True"
