@@ -117,7 +117,7 @@ def test_a_toy_model_and_a_toy_light_are_found_and_drawn(tmp_path: Path, python:
     # Every law is put to it: the contracts run on what is found.
     tests = Path(__file__).parent.parent
     laws = [str(path) for path in sorted((tests / "contracts").glob("test_*.py")) if path.stem in LAWS]
-    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-p", "no:xdist", "-m", "not slow", "-k", "toy"]
+    command = [sys.executable, "-m", "pytest", "-p", "no:cacheprovider", "-p", "no:xdist", "-m", "not slow", "-k", "toy"]
     command += ["-c", str(tests.parent / "pyproject.toml"), *laws]
     path = f"{tmp_path}{os.pathsep}{tests}"
     environment = {**os.environ, "PYTHONPATH": path}
