@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from glshade.mesh import Mesh as Mesh
     from glshade.plan import Plan as Plan
     from glshade.plan import explain as explain
+    from glshade.pyrender import from_pyrender as from_pyrender
     from glshade.scene import Film as Film
     from glshade.scene import Object as Object
     from glshade.scene import Scene as Scene
@@ -63,6 +64,7 @@ _HOME = {
     "compare": "comparison",
     "evaluate": "gl.evaluate",
     "explain": "plan",
+    "from_pyrender": "pyrender",
     "load": "scene_file",
     "reference": "",
     "render": "gl.renderer",

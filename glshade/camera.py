@@ -108,6 +108,7 @@ class Camera(Document):
         None, description="world from camera, in place of eye, target and up: x right, y up, looking along -z"
     )
     fit: bool = Field(False, description="keep the direction of view, and move to where the whole scene is seen")
+    turn: Finite = Field(0.0, description="turned round the target, or the scene's middle, about up: a turntable [degrees]")
     near: Finite | None = Field(None, description="depth of the near plane; left out: from the scene")
     far: Finite | None = Field(None, description="depth of the far plane; left out: from the scene")
 
@@ -145,7 +146,17 @@ class Camera(Document):
             # Looking straight along `up`: any other axis will do, the least parallel one is the steadiest.
             right = np.cross(np.eye(3)[np.argmin(np.abs(backward))], backward)
         right = right / np.linalg.norm(right)
-        return np.stack([right, np.cross(backward, right), backward])
+        axes: Array = np.stack([right, np.cross(backward, right), backward]) @ self._turned.T
+        return axes
+
+    @property
+    def _turned(self) -> Array:
+        """(3, 3): the rotation of `turn` about `up` (Rodrigues)."""
+        x, y, z = np.array(self.up) / np.linalg.norm(self.up)
+        across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+        angle = math.radians(self.turn)
+        turned: Array = np.eye(3) + math.sin(angle) * across + (1 - math.cos(angle)) * across @ across
+        return turned
 
     @property
     def framing(self) -> bool:
@@ -165,10 +176,10 @@ class Camera(Document):
                 around = np.array([[-least] * 3, [least] * 3])
             place, half_width, half_height = self.frame(around, half_width, half_height, aspect)
             eye = middle + place @ axes
-        elif self.matrix is not None:
-            eye = np.array(self.matrix)[:3, 3]
         else:
-            eye = np.array(self.eye)
+            eye = np.array(self.matrix)[:3, 3] if self.matrix is not None else np.array(self.eye)
+            pivot = middle if self.target is None else np.array(self.target)
+            eye = pivot + self._turned @ (eye - pivot)
         near, far = self.depth_range(-(points - eye) @ axes[2])
         return View(isinstance(self, Perspective), eye, axes, half_width, half_height, near, far)
 

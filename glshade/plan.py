@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Literal
+from types import SimpleNamespace
+from typing import Any, Literal
+
+import numpy as np
 
 from glshade.assembly import Assembly, Instance, assemble
-from glshade.brdfs import BRDFS, Brdf
+from glshade.brdfs import BRDFS, Array, Brdf
 from glshade.lights import Falloff, Light
 from glshade.scene import Rate, Scene
 from glshade.texels import Texels, texels
@@ -38,6 +42,8 @@ def kind(light: Light) -> tuple[str, Falloff]:
 
 # Up to here the count of lights is in the program, and its loop has a constant end; above, a uniform block holds a page.
 EXACT_LIGHTS = 8
+# A page of lights in a uniform block: 16 KiB is what every driver has, and a spot light, the largest, takes 64 bytes.
+PAGE = 256
 
 Use = Literal["uniform", "grey", "texture", "unused"]
 
@@ -123,6 +129,12 @@ class ProgramPlan:
         return tuple(name for name, use in self.parameters if channel(use) is not None)
 
     @property
+    def coloured(self) -> bool:
+        """Whether the shading looks at vertex colours, which multiply the model's base."""
+        declared = BRDFS[self.brdf].parameters()
+        return self.vertex_colours and any(declared[name].base and use != "unused" for name, use in self.parameters)
+
+    @property
     def mapped(self) -> bool:
         """Whether the shading reads any texture."""
         return bool(self.textured) or self.normal_map or self.direction_map
@@ -130,6 +142,11 @@ class ProgramPlan:
     def picture_of(self, name: str) -> str:
         """The parameter under whose name the texture of `name` is bound."""
         return dict(self.shared).get(name, name)
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """What the model's places are filled with, by file names."""
+        return tuple(name for _, text in self.slots for name in _INCLUDED.findall(text))
 
     def __str__(self) -> str:
         lights = [f"{group.count or 'many'} {group.key}" for group in self.lights] + ["ambient"] * (self.ambient != "none")
@@ -140,8 +157,7 @@ class ProgramPlan:
         extras += ["vertex colours"] * self.vertex_colours
         extras += ["normals not normalised"] * (not self.normalise) + ["fast arithmetic"] * (self.arithmetic == "fast")
         extras += ["both sides"] * self.both_sides + [f"alpha {self.alpha}"] * (self.alpha != "opaque")
-        parts = [name for _, text in self.slots for name in _INCLUDED.findall(text)]
-        model = self.brdf + f" ({', '.join(parts)})" * bool(parts)
+        model = self.brdf + f" ({', '.join(self.parts)})" * bool(self.parts)
         return ", ".join(
             [f"{model} per {PER[self.rate]}", " + ".join(lights) or "no light", self.viewer, *extras, self.encoding]
         )
@@ -187,12 +203,15 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
             continue
         shares = {False: count - white[name, falloff], True: white[name, falloff]}
         groups += [LightGroup(name, falloff, grey, share) for grey, share in shares.items() if share]
-    # Where no texture takes part, ambient light adds one colour, which is worked out beforehand.
-    varies = instance.vertex_colours or any(isinstance(getattr(material, name), Texture) for name in model.parameters())
-    how: Literal["none", "constant", "varying"] = "none" if not ambient else "varying" if varies else "constant"
-    asked = material.asked("light") if groups else frozenset()
-    asked |= material.asked("ambient") if how == "varying" else frozenset()
-    asked |= {model.parameters()[name].same_as or name for name in asked if getattr(material, name) is None}
+    # Where no texture or vertex colour takes part, ambient light adds one colour, which is worked out beforehand.
+    base = next((name for name, declared in model.parameters().items() if declared.base), None)
+    seen = _with_equals(material, material.asked("ambient"))
+    varies = (instance.vertex_colours and base in seen) or any(isinstance(getattr(material, name), Texture) for name in seen)
+    how: Literal["none", "constant", "varying"] = "varying" if ambient and varies else "none"
+    if ambient and not varies and ambient_reflectance(material).any():
+        how = "constant"
+    asked = _with_equals(material, material.asked("light")) if groups else frozenset()
+    asked |= seen if how == "varying" else frozenset()
     parameters, shared = [], []
     pictures: dict[Texels, str] = {}
     for name, declared in model.parameters().items():
@@ -209,8 +228,10 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
                 first = pictures.setdefault(texels(material, name), name)
                 shared += [(name, first)] * (first != name)
         parameters.append((name, use))
-    base = next((name for name, declared in model.parameters().items() if declared.base), None)
     carries_alpha = material.alpha_mode != "opaque" and base is not None and isinstance(getattr(material, base), Texture)
+    vertex_colours = instance.vertex_colours and (base in asked or material.alpha_mode != "opaque")
+    # One alpha everywhere, and enough of it: nothing is cut out.
+    whole = not (carries_alpha or vertex_colours) and material.alpha >= material.alpha_cutoff
     bumpy = (material.normal_map is not None or material.bump_map is not None) and bool(groups)
     tangents = material.needs_tangents and bool(groups)
     return ProgramPlan(
@@ -222,9 +243,9 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         ambient=how,
         viewer="perspective" if assembly.view.perspective else "orthographic",
         both_sides=instance.back_faces and bool(groups),
-        alpha=material.alpha_mode,
+        alpha="opaque" if material.alpha_mode == "mask" and whole else material.alpha_mode,
         alpha_from=base if carries_alpha else None,
-        vertex_colours=instance.vertex_colours and (bool(groups) or ambient or material.alpha_mode != "opaque"),
+        vertex_colours=vertex_colours,
         normal_map=bumpy,
         anisotropic=tangents,
         encoding=encoding,
@@ -235,6 +256,30 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         normalise=instance.quality.normalise is not False or not groups or instance.rate != "phong" or bumpy or tangents,
         arithmetic=(instance.quality.arithmetic if groups else None) or "stable",
     )
+
+
+def _with_equals(material: Brdf, asked: frozenset[str]) -> frozenset[str]:
+    """The parameters that are asked for, and those that they equal where they are left out."""
+    declared = material.parameters()
+    return asked | {declared[name].same_as or name for name in asked if getattr(material, name) is None}
+
+
+def parameter_values(material: Brdf) -> dict[str, Any]:
+    """name -> value, with what is left out filled in."""
+    values = {name: (getattr(material, name), declared.same_as) for name, declared in material.parameters().items()}
+    return {
+        name: getattr(material, same_as) if value is None and same_as else value for name, (value, same_as) in values.items()
+    }
+
+
+def ambient_reflectance(material: Brdf) -> Array:
+    """(3,): what it reflects of ambient light, where it asks for no texture."""
+    values: dict[str, Any] = {}
+    for name, value in parameter_values(material).items():
+        # What does not count may be one all the same: any number stands for it.
+        given = (value.factor if material.is_colour(name) else value.factor[0]) if isinstance(value, Texture) else value
+        values[name] = np.asarray(given, dtype=np.float64)
+    return type(material).ambient_reflectance(SimpleNamespace(**values, **material.chosen()))
 
 
 def turn(material: Brdf) -> float:
@@ -249,36 +294,68 @@ def explain(scene: Scene, shading: Rate | None = None) -> Plan:
     Errors: SceneError.
     """
     assembly = assemble(scene, shading)
-    return plan(assembly, scene.film.encoding if scene.film.samples == 1 else "linear")
+    film, storage = scene.film, scene.quality.storage
+    # What is averaged, blended or added afterwards is drawn in linear light.
+    direct = film.samples == 1 and len(film.background) == 3 and storage in (None, "auto")
+    direct &= not any(i.material.alpha_mode == "blend" or _has_pages(i, assembly) for i in assembly.instances)
+    return plan(assembly, film.encoding if direct else "linear")
+
+
+def _has_pages(instance: Instance, assembly: Assembly) -> bool:
+    """Whether there are more lights of a kind than one draw takes."""
+    if not instance.material.asked("light"):
+        return False
+    reached = (assembly.lights[i] for i in instance.lights)
+    return max(Counter(kind(light) for light in reached if not light.omnidirectional).values(), default=0) > PAGE
 
 
 def plan(assembly: Assembly, encoding: Literal["linear", "srgb"]) -> Plan:
     """The plan of an assembled scene."""
     programs: dict[ProgramPlan, int] = {}
     draws: list[tuple[str, int]] = []
-    reasons: dict[str, str] = {}
+    why: dict[str, str] = {}
     for instance in assembly.instances:
         program = plan_instance(instance, assembly, encoding)
         draws.append((instance.name, programs.setdefault(program, len(programs))))
-        reasons.setdefault(f"brdf {program.brdf} per {PER[program.rate]}", instance.name)
-        for name in program.textured:
-            reasons.setdefault(f"texture of {name}", instance.name)
-        if program.normal_map:
-            reasons.setdefault("bump map" if instance.material.bump_map else "normal map", instance.name)
-        if program.direction_map:
-            reasons.setdefault("directions of tangents", instance.name)
-        if program.turned:
-            reasons.setdefault("tangents turned", f"{instance.name}, by {turn(instance.material):g} degrees")
-        if program.vertex_colours:
-            reasons.setdefault("vertex colours", instance.name)
-        if program.both_sides:
-            reasons.setdefault("both sides", f"{instance.name}, whose mesh is open, or seen from inside, or told so")
-        if program.alpha != "opaque":
-            reasons.setdefault(f"alpha {program.alpha}", instance.name)
-        for group in program.lights:
-            first = next(i for i in instance.lights if group.holds(assembly.lights[i]))
-            reasons.setdefault(f"light {group.key}", assembly.lights[first].name or f"lights[{first}]")
-        if program.ambient != "none":
-            first = next(i for i in instance.lights if assembly.lights[i].omnidirectional)
-            reasons.setdefault("light ambient", assembly.lights[first].name or f"lights[{first}]")
-    return Plan(tuple(programs), tuple(draws), tuple(reasons.items()))
+        for feature, reason in reasons(program, instance, assembly):
+            why.setdefault(feature, reason)
+    return Plan(tuple(programs), tuple(draws), tuple(why.items()))
+
+
+def reasons(program: ProgramPlan, instance: Instance, assembly: Assembly) -> Iterator[tuple[str, str]]:
+    """(feature, what requires it) of a program that draws the instance: an object, a light, the camera or the film."""
+    name, material = instance.name, instance.material
+
+    def light(index: int) -> str:
+        return assembly.lights[index].name or f"lights[{index}]"
+
+    yield f"brdf {program.brdf} per {PER[program.rate]}", name
+    for part in program.parts:
+        yield f"{program.brdf}'s {part}", name
+    for parameter in program.textured:
+        yield f"texture of {parameter}", name
+    if program.normal_map:
+        yield "bump map" if material.bump_map else "normal map", name
+    if program.direction_map:
+        yield "directions of tangents", name
+    if program.turned:
+        yield "tangents turned", f"{name}, by {turn(material):g} degrees"
+    if program.vertex_colours:
+        yield "vertex colours", name
+    if program.both_sides:
+        yield "both sides", f"{name}, whose mesh is open, or seen from inside, or told so"
+    if program.alpha != "opaque":
+        yield f"alpha {program.alpha}", name
+    if program.alpha_from:
+        yield f"alpha of {program.alpha_from}'s texture", name
+    if not program.normalise:
+        yield "normals not normalised", f"{name}, by quality.normalise"
+    if program.arithmetic == "fast":
+        yield "fast arithmetic", f"{name}, by quality.arithmetic"
+    for group in program.lights:
+        yield f"light {group.key}", light(next(i for i in instance.lights if group.holds(assembly.lights[i])))
+    if program.ambient != "none":
+        yield "light ambient", light(next(i for i in instance.lights if assembly.lights[i].omnidirectional))
+    if program.directed:
+        yield program.viewer, "camera"
+    yield program.encoding, "film"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, SkipValidation, Tag, WithJsonSchema, model_validator
 
+from glshade.animation import Track
 from glshade.brdfs import BRDFS, Brdf
 from glshade.camera import CAMERAS, Camera, Matrix4, Perspective, affine
 from glshade.document import Chosen, Document, File, Finite, Triple, Vector3, fault, nearest, number
@@ -186,6 +187,10 @@ class Scene(Document):
     )
 
     quality: Quality = Field(default_factory=Quality, description="what is traded for speed")
+    cameras: dict[str, Annotated[Camera, Chosen(CAMERAS, "type", default="perspective")]] = Field(
+        {}, description="name -> camera: others to look through, by `glshade render --camera`"
+    )
+    animation: tuple[Track, ...] = Field((), description="what changes from frame to frame")
 
     @model_validator(mode="before")
     @classmethod

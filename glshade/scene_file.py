@@ -4,56 +4,124 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
 
 from glshade import mesh_file
-from glshade.document import Document
+from glshade.document import Document, nearest
 from glshade.errors import AssetError, SceneError
 from glshade.image import probe
-from glshade.scene import Film, Object, Scene
+from glshade.scene import Scene
 from glshade.texture import Picture
 
 TEXT_SUFFIXES = (".toml", ".json")
 
 
-def load(path: str | Path) -> Scene:
+def load(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scene:
     """The scene in a file, with its meshes read.
 
-    A mesh file is framed by a camera, lit by the default rig and drawn in its own material. Errors: SceneError with every
-    fault: file, key path, what is allowed.
+    A mesh file is framed by a camera, lit by the default rig and drawn in its own material. overrides: values in place of the
+    file's, by dotted keys such as "materials.body.roughness" or "objects.ball.shading", in their order. Errors: SceneError with
+    every fault: file, key path, what is allowed.
     """
-    path = Path(path)
-    suffix = path.suffix.lower()
-    if suffix in mesh_file.SUFFIXES:
-        mesh_file.load(path)
-        return Scene(
-            description=path.name,
-            objects=(Object(name=path.stem, mesh=path),),
-            film=Film(samples=4, background=BACKDROP),
-        )
-    if suffix not in TEXT_SUFFIXES:
-        known = ", ".join([*TEXT_SUFFIXES, *sorted(mesh_file.SUFFIXES)])
-        raise SceneError(f"{path}: {suffix or 'no extension'} is neither a scene nor a mesh; known: {known}")
-    scene = parse(_read(path), path)
-    problems: list[str] = []
-    for index, item in enumerate(scene.objects):
-        if isinstance(item.mesh, Path):
-            try:
-                mesh_file.load(item.mesh)
-            except SceneError as error:
-                problems.extend(f"{path}: objects[{index}].mesh: {problem}" for problem in error.problems)
-    for place, picture in _pictures(scene):
+    return SceneFile(path, overrides).scene()
+
+
+class SceneFile:
+    """A scene as it is written, to be taken at any frame and through any of its cameras.
+
+    Errors: SceneError, for what cannot be read, and for overrides that lead nowhere.
+    """
+
+    def __init__(self, path: str | Path, overrides: Mapping[str, Any] | None = None) -> None:
+        self.path = Path(path)
+        suffix = self.path.suffix.lower()
+        if suffix in mesh_file.SUFFIXES:
+            mesh_file.load(self.path)
+            # Its name is the key to it; what is absolute needs no folder.
+            mesh = {"name": self.path.stem, "mesh": str(self.path.resolve())}
+            document: Any = {"description": self.path.name, "objects": [mesh], "film": {"samples": 4, "background": BACKDROP}}
+        elif suffix in TEXT_SUFFIXES:
+            document = _read(self.path)
+        else:
+            known = ", ".join([*TEXT_SUFFIXES, *sorted(mesh_file.SUFFIXES)])
+            raise SceneError(f"{self.path}: {suffix or 'no extension'} is neither a scene nor a mesh; known: {known}")
+        self.document = _overridden(document, overrides, self.path)
+        self._checked: set[Path] = set()
+
+    @cached_property
+    def cameras(self) -> tuple[str, ...]:
+        """The names of its cameras."""
+        return tuple(parse(self.document, self.path).cameras)
+
+    def scene(self, frame: float | None = None, camera: str | None = None) -> Scene:
+        """The scene at a frame, as it is written where that is None, through one of its cameras.
+
+        Errors: SceneError with every fault.
+        """
+        document = self.document
+        if frame is not None:
+            document = self._at(frame)
+        if camera is not None:
+            if camera not in self.cameras:
+                raise SceneError(f'{self.path}: no camera is named "{camera}"{nearest(camera, self.cameras)}')
+            document = {**document, "camera": document["cameras"][camera]}
+        scene = parse(document, self.path)
+        self._check(scene)
+        return scene
+
+    def _at(self, frame: float) -> Any:
+        tracks = parse(self.document, self.path).animation
+        if not tracks:
+            return self.document
+        from glshade.animation import at_frame
+        from glshade.override import OverrideError
+
         try:
-            probe(picture)
-        except AssetError as error:
-            problems.append(f"{path}: {place}: {error}")
+            return at_frame(self.document, tracks, frame)
+        except OverrideError as error:
+            raise SceneError(f"{self.path}: animation: {error}") from None
+
+    def _check(self, scene: Scene) -> None:
+        """Looks at the files that the scene names, each once."""
+        problems: list[str] = []
+        for index, item in enumerate(scene.objects):
+            if isinstance(item.mesh, Path):
+                try:
+                    mesh_file.load(item.mesh)
+                except SceneError as error:
+                    problems.extend(f"{self.path}: objects[{index}].mesh: {problem}" for problem in error.problems)
+        for place, picture in _pictures(scene):
+            if picture in self._checked:
+                continue
+            try:
+                probe(picture)
+                self._checked.add(picture)
+            except AssetError as error:
+                problems.append(f"{self.path}: {place}: {error}")
+        if problems:
+            raise SceneError(problems)
+
+
+def _overridden(document: Any, overrides: Mapping[str, Any] | None, path: Path) -> Any:
+    """Errors: SceneError for a key that leads nowhere."""
+    if not overrides:
+        return document
+    from glshade.override import OverrideError, apply
+
+    problems = []
+    for key, value in overrides.items():
+        try:
+            document = apply(document, key, value)
+        except OverrideError as error:
+            problems.append(f"{path}: --set {error}")
     if problems:
         raise SceneError(problems)
-    return scene
+    return document
 
 
 def _pictures(scene: Scene) -> Iterator[tuple[str, Path]]:

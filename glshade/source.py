@@ -13,17 +13,16 @@ from functools import lru_cache
 from pathlib import Path
 
 from glshade.brdfs import BRDFS, Parameter
+from glshade.definitions import unreached
 from glshade.document import nearest
 from glshade.errors import ShaderError
 from glshade.lights import LIGHTS
+from glshade.plan import PAGE as PAGE
 from glshade.plan import LightGroup, ProgramPlan, channel
 
 # Inside a wheel the shaders lie beside this module; in a checkout, beside the package.
 _INSTALLED = Path(__file__).parent / "_shaders"
 SHADERS = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parent.parent / "shaders"
-
-# A page of lights in a uniform block: 16 KiB is what every driver has, and a spot light, the largest, takes 64 bytes.
-PAGE = 256
 
 _INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
 
@@ -91,6 +90,14 @@ def expand(name: str, generated: Mapping[str, str], root: Path | None = None, fa
     return Stage("\n".join(text) + "\n", tuple(lines))
 
 
+def without_unreached(stage: Stage) -> Stage:
+    """The stage without the functions, structs and constants that its files define for others."""
+    lines = stage.text.splitlines()
+    gone = {i for one in unreached(lines) for i in range(one.first, one.end)}
+    kept = [i for i in range(len(lines)) if i not in gone]
+    return Stage("".join(f"{lines[i]}\n" for i in kept), tuple(stage.lines[i] for i in kept))
+
+
 @lru_cache(maxsize=1024)
 def generate(plan: ProgramPlan) -> Source:
     """The text of the program that `plan` describes. The same plan gives the same text."""
@@ -107,7 +114,8 @@ def generate(plan: ProgramPlan) -> Source:
         fragment_pass = f"{name}.frag" if plan.rate == "gouraud" else "flat.frag"
     fragment["output"] = f'#include "output/{plan.encoding}.glsl"\n'
     fast = plan.arithmetic == "fast"
-    return Source(expand(f"pass/{vertex_pass}", vertex, fast=fast), expand(f"pass/{fragment_pass}", fragment, fast=fast))
+    stages = (expand(f"pass/{vertex_pass}", vertex, fast=fast), expand(f"pass/{fragment_pass}", fragment, fast=fast))
+    return Source(*map(without_unreached, stages))
 
 
 class _Interpolated:
@@ -142,7 +150,7 @@ TYPES = {"position": "vec3", "normal": "vec3", "tangent": "vec4", "uv": "vec2", 
 def _wanted(plan: ProgramPlan) -> list[str]:
     """What the shading asks of a surface, in a fixed order."""
     wanted = ["position"] * plan.positions + ["normal"] * plan.directed + ["tangent"] * plan.tangents
-    return wanted + ["uv"] * plan.mapped + ["colour"] * plan.vertex_colours
+    return wanted + ["uv"] * plan.mapped + ["colour"] * plan.coloured
 
 
 def _varyings(plan: ProgramPlan, direction: str) -> str:
@@ -152,7 +160,11 @@ def _varyings(plan: ProgramPlan, direction: str) -> str:
 def _handed_on(plan: ProgramPlan) -> list[str]:
     """What passes from the vertex to the fragment stage under phong: what the shading wants, and what alpha does."""
     names = _wanted(plan)
-    return [*names, "uv"] if plan.alpha_from and "uv" not in names else names
+    return names + [name for name in _wanted_by_alpha(plan) if name not in names]
+
+
+def _wanted_by_alpha(plan: ProgramPlan) -> list[str]:
+    return ["uv"] * bool(plan.alpha_from) + ["colour"] * (plan.vertex_colours and plan.alpha != "opaque")
 
 
 def _varying(name: str, direction: str) -> str:
@@ -338,7 +350,7 @@ def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
 
 def _alpha_inputs(plan: ProgramPlan, direction: str) -> str:
     """What the fragment stage of a per-vertex or per-face program asks of the vertex stage beside its colour."""
-    names = ["uv"] * bool(plan.alpha_from) + ["colour"] * (plan.vertex_colours and plan.alpha != "opaque")
+    names = _wanted_by_alpha(plan)
     text = "".join(f"{_varying(name, direction)}\n" for name in names)
     if direction == "in":
         return text

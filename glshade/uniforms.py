@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from glshade.assembly import Assembly, Instance
 from glshade.brdfs import Brdf
 from glshade.lights import LIGHTS, Falloff, Light
-from glshade.plan import LightGroup, ProgramPlan, channel, turn
+from glshade.plan import LightGroup, ProgramPlan, ambient_reflectance, channel, turn
+from glshade.plan import parameter_values as parameter_values
 from glshade.texels import Texels, texels
 from glshade.texture import Texture
 
@@ -148,18 +149,8 @@ def ambient_intensity(assembly: Assembly, chosen: tuple[int, ...], exposure: flo
 
 def ambient_radiance(instance: Instance, assembly: Assembly, exposure: float) -> Values:
     """What ambient light adds to a surface of one colour."""
-    model = type(instance.material)
-    values = {name: np.asarray(value, dtype=np.float64) for name, value in parameter_values(instance.material).items()}
-    reflectance = model.ambient_reflectance(SimpleNamespace(**values, **instance.material.chosen()))
-    return {"u_ambient_radiance": rounded(reflectance * ambient_intensity(assembly, instance.lights, exposure))}
-
-
-def parameter_values(material: Brdf) -> dict[str, Any]:
-    """name -> value, with what is left out filled in."""
-    values = {name: (getattr(material, name), declared.same_as) for name, declared in material.parameters().items()}
-    return {
-        name: getattr(material, same_as) if value is None and same_as else value for name, (value, same_as) in values.items()
-    }
+    intensity = ambient_intensity(assembly, instance.lights, exposure)
+    return {"u_ambient_radiance": rounded(ambient_reflectance(instance.material) * intensity)}
 
 
 def numbers(brdf: Brdf) -> Values:

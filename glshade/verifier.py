@@ -215,7 +215,8 @@ def surfaces(scene: Scene, *, driver: Driver = LLVMPIPE) -> tuple[NDArray[np.int
     order = np.argsort(solid.fragments.depth, kind="stable")
     numbers = np.array([draw.instance.number for draw in inputs.draws], dtype=np.intp)
     found[solid.fragments.pixel[order]] = numbers[solid.fragments.draw[order]]
-    certain = np.isin(classes, (PixelClass.BACKGROUND, PixelClass.INTERIOR, PixelClass.SEAM))
+    # Not seams: where two faces of a cube meet, either may be drawn.
+    certain = np.isin(classes, (PixelClass.BACKGROUND, PixelClass.INTERIOR))
     certain[layers.fragments.pixel[layers.partial]] = False
     return found.reshape(height, width), certain.reshape(height, width)
 

@@ -8,10 +8,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from glshade.animation import Track
 from glshade.brdfs import BRDFS, Brdf
 from glshade.camera import CAMERAS, Camera
 from glshade.document import Document
 from glshade.lights import LIGHTS, Light
+from glshade.quality import Quality
 from glshade.scene import Film, Object, Scene, Transform
 from glshade.shape import SHAPES
 from glshade.texture import BumpMap, DirectionMap, NormalMap, Texture
@@ -53,6 +55,11 @@ NAMED = {
     ("Object", "shape"): "[shape](#shapes), or its type alone",
     ("Object", "transform"): "[transform](#transform)",
     ("Object", "material"): "name, or [material](#materials)",
+    ("Scene", "cameras"): "table of [cameras](#camera)",
+    ("Scene", "animation"): "list of [tracks](#animation)",
+    ("Scene", "quality"): "[quality](#quality)",
+    ("Object", "quality"): "[quality](#quality)",
+    ("Track", "values"): "list of numbers, or of lists of numbers",
     ("Film", "background"): "3 or 4 numbers",
 }
 TABLES = {
@@ -187,6 +194,7 @@ def scene_file() -> str:
     text += section(2, "Lights", Light)
     for name in LIGHTS:
         text += section(3, f"`{name}`", LIGHTS[name], Light)
+    text += section(2, "Quality", Quality) + section(2, "Animation", Track)
     return text.replace("\n\n\n", "\n\n")
 
 

@@ -105,7 +105,9 @@ class Lafortune(Brdf):
 
     def asked(self, by: Literal["light", "ambient"]) -> frozenset[str]:
         absent = set(LOBES) - set(self._lobes())
-        return super().asked(by) - {f"{name}_{i}" for i in absent for name in ("ks", "cx", "cy", "cz", "exponent")}
+        unasked = {f"{name}_{i}" for i in absent for name in ("ks", "cx", "cy", "cz", "exponent")}
+        # Without tangents both axes of the plane are one, and cx speaks for it.
+        return super().asked(by) - unasked - ({f"cy_{i}" for i in LOBES} if not self.needs_tangents else set())
 
     def slots(self) -> dict[str, str]:
         axes = "anisotropic" if self.needs_tangents else "isotropic"

@@ -4,9 +4,16 @@ from __future__ import annotations
 
 import re
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from glshade.frames import Picture
+    from glshade.gl.renderer import Renderer
+    from glshade.scene import Scene
+    from glshade.scene_file import SceneFile
+    from glshade.tradeoff.budget import Choice
 
 
 class Size(click.ParamType[tuple[int, int]]):
@@ -23,14 +30,44 @@ class Size(click.ParamType[tuple[int, int]]):
         return int(match[1]), int(match[2])
 
 
+def overrides(command: Any) -> Any:
+    """The option --set, which gives `overrides`: dotted key -> value."""
+    return click.option(
+        "--set",
+        "overrides",
+        multiple=True,
+        metavar="KEY=VALUE",
+        callback=lambda ctx, param, texts: _parsed(texts, "--set"),
+        help="Puts a value in the place of the scene's: quality.fresnel=schlick, materials.body.roughness=0.3, "
+        "objects.ball.material=gold, film.size=[640,360].",
+    )(command)
+
+
+def _parsed(texts: tuple[str, ...], option: str) -> dict[str, Any]:
+    from glshade.override import parse
+
+    try:
+        return dict(parse(text) for text in texts)
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint=f"'{option}'") from None
+
+
 @click.command()
-@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("scenes", metavar="SCENE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "-o",
     "--output",
-    type=click.Path(path_type=Path),
-    help="Picture to write; the extension says how: png, jpg, tif, exr, hdr. [default: NAME.png]",
+    help="Picture to write; the extension says how: png, jpg, tif, exr, hdr. Of several pictures: a pattern with {scene}, "
+    "{camera} and a # for each digit of the frame. [default: NAME.png]",
 )
+@click.option("-f", "--frames", metavar="RANGE", help="Frames of the scene's animation: 1-100, 1-100x5, 1,3,7-9, 1..100.")
+@click.option(
+    "--camera", "cameras", multiple=True, metavar="NAME", help="Looks through one of the scene's `cameras`; repeatable."
+)
+@click.option(
+    "--overwrite", is_flag=True, help="Of several pictures: replaces those that are there. (One picture always does.)"
+)
+@click.option("--skip-existing", is_flag=True, help="Leaves out pictures whose files are there.")
 @click.option("--size", type=Size(), help="Overrides the film's size [pixels].")
 @click.option("--samples", type=click.Choice(["1", "2", "4", "8"]), help="Overrides the film's samples a pixel.")
 @click.option(
@@ -38,53 +75,138 @@ class Size(click.ParamType[tuple[int, int]]):
     type=click.Choice(["flat", "gouraud", "phong"]),
     help="Per face, per vertex or per pixel, for the whole picture.",
 )
+@overrides
 @click.option("--reference", is_flag=True, help="Drawn by the float64 reference, on the CPU; one sample a pixel.")
 @click.option("--exposure", type=float, help="Overrides the film's exposure [stops].")
+@click.option(
+    "--budget",
+    multiple=True,
+    metavar="METRIC=LIMIT",
+    help="Draws with the cheapest settings whose error stays within it: max_abs=2e-3, rmse=, p999=, codes=, flip=.",
+)
+@click.option("--deadline", type=click.FloatRange(min=0, min_open=True), help="Draws as exactly as can be in a time [ms].")
 @click.option("--backend", type=click.Choice(["auto", "egl", "osmesa", "standalone"]), default="auto", show_default=True)
 @click.option("--device", type=int, help="EGL device, as `glshade devices` counts them.")
 def command(
-    scene: Path,
-    output: Path | None,
+    scenes: tuple[Path, ...],
+    output: str | None,
+    frames: str | None,
+    cameras: tuple[str, ...],
+    overwrite: bool,
+    skip_existing: bool,
     size: tuple[int, int] | None,
     samples: str | None,
     shading: Any,
+    overrides: dict[str, Any],
     reference: bool,
     exposure: float | None,
+    budget: tuple[str, ...],
+    deadline: float | None,
     backend: Any,
     device: int | None,
 ) -> None:
-    """Renders SCENE (.toml, .json, or a mesh: .obj .ply .stl .off .glb .gltf) to a picture."""
-    from pydantic import ValidationError
+    """Renders scenes (.toml, .json, or a mesh: .obj .ply .stl .off .glb .gltf) to pictures.
 
+    Several frames, cameras or scenes are a batch: it refuses to begin where one of its pictures is there already, unless told
+    to --overwrite or to --skip-existing.
+    """
     from glshade.image import FLOAT_SUFFIXES, check_suffix
-    from glshade.scene import Film
-    from glshade.scene_file import load
+    from glshade.scene_file import SceneFile
 
     if output is not None:
-        check_suffix(output)
-    loaded = load(scene)
-    output = output or Path(f"{scene.stem}.png")
-    wanted = {"size": size, "samples": samples and int(samples), "exposure": exposure}
-    changes = {key: value for key, value in wanted.items() if value is not None}
-    if changes:
-        try:
-            film = Film.model_validate({**loaded.film.model_dump(), **changes})
-        except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            raise click.BadParameter(first["msg"], param_hint=f"'--{first['loc'][0]}'") from None
-        loaded = loaded.model_copy(update={"film": film})
+        check_suffix(Path(output))
+    limits = _limits(budget)
+    if (limits or deadline) and (reference or shading or (limits and deadline)):
+        raise click.UsageError("--budget and --deadline choose the settings: not together, nor with --shading or --reference")
+    film = {"size": size, "samples": samples and int(samples), "exposure": exposure}
+    changes = {key: value for key, value in film.items() if value is not None}
+    wanted = _pictures([SceneFile(path, overrides) for path in scenes], frames, cameras, output)
+    if skip_existing:
+        wanted = [picture for picture in wanted if not picture.output.exists()]
+    elif len(wanted) > 1 and not overwrite:
+        there = [picture.output for picture in wanted if picture.output.exists()]
+        if there:
+            more = f" and {len(there) - 1} more" if len(there) > 1 else ""
+            raise click.UsageError(f"{there[0]}{more} exists: --overwrite or --skip-existing?")
+    if not wanted:
+        return
+
+    def loaded(picture: Picture) -> Scene:
+        return _filmed(picture.scene.scene(picture.frame, picture.camera), changes)
+
+    # Only a scene without faults is worth a context.
+    first = loaded(wanted[0])
     if reference:
         from glshade.reference import render
 
-        picture = render(loaded, shading=shading)
-        (picture if output.suffix.lower() in FLOAT_SUFFIXES else picture.encoded(loaded.film.encoding)).save(output)
-        click.echo(str(output))
+        for picture in wanted:
+            scene = loaded(picture)
+            image = render(scene, shading=shading)
+            linear = picture.output.suffix.lower() in FLOAT_SUFFIXES
+            (image if linear else image.encoded(scene.film.encoding)).save(picture.output)
+            click.echo(str(picture.output))
         return
-    # Only a scene without faults is worth a context.
     from glshade.gl.renderer import Renderer
 
     with Renderer(backend, device) as renderer:
-        linear = output.suffix.lower() in FLOAT_SUFFIXES
-        image = renderer.render(loaded, dtype="float32" if linear else "uint8", shading=shading)
-        image.save(output)
-    click.echo(str(output))
+        chosen: dict[Path, Choice] = {}
+        for number, picture in enumerate(wanted):
+            scene = loaded(picture) if number else first
+            if limits or deadline:
+                path = picture.scene.path
+                if path not in chosen:
+                    chosen[path] = _chosen(scene, renderer, limits, deadline)
+                scene = chosen[path].applied(scene)
+            linear = picture.output.suffix.lower() in FLOAT_SUFFIXES
+            renderer.render(scene, dtype="float32" if linear else "uint8", shading=shading).save(picture.output)
+            click.echo(str(picture.output))
+
+
+def _pictures(files: list[SceneFile], frames: str | None, cameras: tuple[str, ...], output: str | None) -> list[Picture]:
+    from glshade.frames import parse, pictures
+
+    try:
+        numbers = None if frames is None else parse(frames)
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="'--frames'") from None
+    try:
+        return list(pictures(files, numbers, cameras, output))
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="'--output'") from None
+
+
+def _filmed(scene: Scene, changes: dict[str, Any]) -> Scene:
+    """The scene on another film."""
+    if not changes:
+        return scene
+    from pydantic import ValidationError
+
+    from glshade.scene import Film
+
+    try:
+        film = Film.model_validate({**scene.film.model_dump(), **changes})
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        raise click.BadParameter(first["msg"], param_hint=f"'--{first['loc'][0]}'") from None
+    return scene.model_copy(update={"film": film})
+
+
+def _limits(texts: tuple[str, ...]) -> dict[str, float]:
+    if not texts:
+        return {}
+    from glshade.tradeoff.budget import parse
+
+    try:
+        return parse(texts)
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="'--budget'") from None
+
+
+def _chosen(scene: Scene, renderer: Renderer, limits: dict[str, float], deadline: float | None) -> Choice:
+    """The settings that are good enough, or quick enough, and a word on stderr."""
+    from glshade.tradeoff.budget import choose, within_deadline
+
+    choice = choose(scene, renderer, limits) if deadline is None else within_deadline(scene, renderer, deadline / 1e3)
+    for line in choice.says(scene).splitlines():
+        click.echo(line, err=True)
+    return choice

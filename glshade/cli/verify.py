@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from glshade.cli.render import Size
+from glshade.cli.render import Size, overrides
 
 if TYPE_CHECKING:
     from glshade.scene import Scene
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     type=click.Choice(["flat", "gouraud", "phong"]),
     help="Per face, per vertex or per pixel, for the whole picture.",
 )
+@overrides
 @click.option("--report", type=click.Path(path_type=Path, file_okay=False), help="Folder for a page with all the evidence.")
 @click.option("--json", "as_json", is_flag=True, help="The verdict as JSON.")
 @click.option(
@@ -42,6 +43,7 @@ def command(
     device: int | None,
     size: tuple[int, int] | None,
     shading: Any,
+    overrides: dict[str, Any],
     report: Path | None,
     as_json: bool,
     max_ambiguous: float,
@@ -59,7 +61,7 @@ def command(
         raise click.UsageError("Missing argument 'SCENE'.")
     from glshade.scene_file import load
 
-    loaded = load(scene)
+    loaded = load(scene, overrides)
     if size is not None:
         loaded = loaded.model_copy(update={"film": loaded.film.model_copy(update={"size": size})})
     if mutate is not None:

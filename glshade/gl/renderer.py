@@ -119,6 +119,14 @@ class Renderer:
             self.context.gl.gc()
             return self._render(scene, dtype, shading, tile)
 
+    def surfaces(self, scene: Scene) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
+        """What is seen at the middle of every pixel: (depth (H, W), number (H, W)), as in `glshade.gl.surfaces`."""
+        from glshade.gl.surfaces import surfaces
+
+        with self.context.gl:
+            self.context.gl.gc()
+            return surfaces(self, scene)
+
     def drawing(self, scene: Scene) -> Callable[[], float]:
         """A function that draws the scene's linear picture once more and says how long that took [s].
 

@@ -35,6 +35,12 @@ Array = NDArray[Any]
 VIEWS = 32
 # What is asked of the views, as a share of the limit: the worst of them is not the worst of all.
 SAFETY = 0.9
+# Timings of each setting; what is chosen is timed again, more often.
+REPEAT = 5
+# Times this near cannot be told apart on a machine that does other things too.
+ALIKE = 1.1
+# What is hardly faster is not worth an error.
+WORTH = 0.97
 # Objects that differ most in the picture are chosen for one by one; the rest go together.
 GROUPS = 6
 # Refining a mesh hangs on the view and takes longer than drawing it, so no budget does it; storage and samples are the film's.
@@ -136,7 +142,7 @@ def choose(scene: Scene, renderer: Renderer, limits: Mapping[str, float], *, cou
     known = _known(place)
     if known is not None:
         return known
-    work = _Work(scene, renderer, count)
+    work = _Work(scene, renderer, count, flip="flip" in limits)
     exact = [EXACT] * len(scene.objects)
     least = work.errors(exact)
     if not within(least, limits, 1.0):
@@ -156,7 +162,7 @@ def choose(scene: Scene, renderer: Renderer, limits: Mapping[str, float], *, cou
     if not within(found, limits, SAFETY):
         chosen, found = exact, least
     seconds, exact_seconds = work.time(chosen)
-    if seconds >= exact_seconds:
+    if seconds > WORTH * exact_seconds:
         chosen, found, seconds = exact, least, exact_seconds
     choice = Choice(
         tuple(chosen), dict(limits), found, seconds, exact_seconds, count, work.runner_up(chosen, uniform, limits, seconds)
@@ -212,8 +218,8 @@ class _View:
 class _Work:
     """What is measured on the way, each thing once."""
 
-    def __init__(self, scene: Scene, renderer: Renderer, count: int) -> None:
-        self.scene, self.renderer = scene, renderer
+    def __init__(self, scene: Scene, renderer: Renderer, count: int, flip: bool = False) -> None:
+        self.scene, self.renderer, self.flip = scene, renderer, flip
         self._seen: dict[tuple[Setting, ...], list[Errors]] = {}
         self._shares: dict[Setting, list[dict[int, dict[str, float]]]] = {}
         exact = [EXACT] * len(scene.objects)
@@ -240,7 +246,7 @@ class _Work:
         for start in range(0, len(others), 8):
             batch = others[start : start + 8]
             scenes = [applied(self.scene, [setting] * number) for setting in batch]
-            times = timed(scene, scenes, self.renderer, unit=self.exact.median or None)
+            times = timed(scene, scenes, self.renderer, REPEAT, self.exact.median or None)
             self.exact = self.exact if self.exact.median else times[0]
             found += list(zip(batch, times[1:], strict=True))
         if not found:
@@ -258,7 +264,7 @@ class _Work:
         key = tuple(settings)
         if key not in self._seen:
             pairs = ((view, self._drawn(view, settings)) for view in self.views)
-            self._seen[key] = [errors(picture, view.truth, view.certain) for view, picture in pairs]
+            self._seen[key] = [errors(picture, view.truth, view.certain, self.flip) for view, picture in pairs]
         return largest(self._seen[key])
 
     def by_group(self, candidates: Sequence[tuple[Setting, Timing]], limits: Mapping[str, float]) -> list[Setting]:
@@ -266,11 +272,16 @@ class _Work:
         averages what is left by the others."""
         chosen: dict[int, Setting] = {}
         for group in range(len(self.groups)):
-            chosen[group] = EXACT
-            for setting, _ in candidates:
-                if self._fits(group, setting, limits):
-                    chosen[group] = setting
+            fitting: list[tuple[float, Setting]] = []
+            fastest = np.inf
+            for setting, timing in candidates:
+                if timing.median > ALIKE * fastest:
                     break
+                if self._fits(group, setting, limits):
+                    fastest = min(fastest, timing.median)
+                    fitting.append((self._worst(group, setting, limits), setting))
+            # Of those that are as fast as can be told, the most exact.
+            chosen[group] = min(fitting, key=lambda pair: pair[0])[1] if fitting else EXACT
         result = [EXACT] * len(self.scene.objects)
         for group, members in enumerate(self.groups):
             for member in members:
@@ -287,6 +298,11 @@ class _Work:
             if share is not None and any(share[metric] > limit for metric, limit in limits.items()):
                 return False
         return True
+
+    def _worst(self, group: int, setting: Setting, limits: Mapping[str, float]) -> float:
+        """The largest share of any limit on any view, of a setting that fits."""
+        found = [view[group] for view in self._shares[setting] if group in view]
+        return max((share[metric] / limit for share in found for metric, limit in limits.items()), default=0.0)
 
     def _shared(self, view: _View, picture: Array) -> dict[int, dict[str, float]]:
         """group -> metric -> its error, as if the whole picture were as that group is."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from itertools import product
 from typing import Any
 
-from glshade.assembly import Assembly, assemble
+from glshade.assembly import assemble
 from glshade.plan import plan_instance
 from glshade.quality import Quality
 from glshade.scene import Scene
@@ -83,8 +83,13 @@ def space(scene: Scene, only: tuple[str, ...] = ()) -> tuple[list[Setting], dict
     seen: dict[Any, Setting] = {}
     kept: set[tuple[str, Any]] = set()
     tried: set[tuple[str, Any]] = set()
+    parts: dict[Setting, Any] = {}
     for setting in _combinations(scene, wanted):
-        made = _made(scene, setting)
+        # What a picture is kept in has no say in what it is made of, and refining a mesh takes its time.
+        bare = replace(setting, storage=EXACT.storage, samples=None)
+        if bare not in parts:
+            parts[bare] = _made(scene, bare)
+        made = parts[bare], setting.storage, setting.samples
         choices = {(f.name, getattr(setting, f.name)) for f in fields(Setting)}
         tried |= choices
         if made not in seen:
@@ -112,8 +117,9 @@ def _combinations(scene: Scene, wanted: tuple[str, ...]) -> Iterator[Setting]:
         if shading == "gouraud":
             ways += [{"shading": shading, "refine": value} for value in options("refine", *REFINEMENTS)[1:]]
     stores: tuple[str, ...] = ("rgba16f", "rgb10_a2", "r11f_g11f_b10f", "rgba8")
-    if any(light.is_negative for light in scene.lights or ()):
-        # There is nothing below zero in it.
+    blends = any(instance.material.alpha_mode == "blend" for instance in assemble(scene).instances)
+    if blends or len(scene.film.background) == 4 or any(light.is_negative for light in scene.lights or ()):
+        # It has no alpha, and nothing below zero.
         stores = tuple(name for name in stores if name != "r11f_g11f_b10f")
     fewer = [count for count in (4, 2, 1) if count < scene.film.samples]
     for fresnel, specular, way, arithmetic, samples, storage in product(
@@ -128,13 +134,8 @@ def _combinations(scene: Scene, wanted: tuple[str, ...]) -> Iterator[Setting]:
 
 
 def _made(scene: Scene, setting: Setting) -> Any:
-    """All that a picture is drawn from: equal for settings that cannot differ."""
-    assembly = _assembled(setting.applied(scene))
-    parts = tuple(
+    """All that a picture is drawn from, but for what it is kept in: equal for settings that cannot differ."""
+    assembly = assemble(setting.applied(scene))
+    return tuple(
         (generate(plan_instance(i, assembly, "linear")), i.material, i.mesh.digest, i.back_faces) for i in assembly.instances
     )
-    return parts, setting.storage, setting.samples
-
-
-def _assembled(scene: Scene) -> Assembly:
-    return assemble(scene)

@@ -9,6 +9,7 @@ pictures of the driver's). Pixels that a driver may cover or not are left out of
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -49,6 +50,10 @@ class Point:
     total: Errors
     by_kind: dict[str, Errors]
 
+    def error(self, metric: str) -> float:
+        """In all; infinite where the picture has values that are not finite, which a metric leaves out."""
+        return math.inf if self.total.non_finite else float(getattr(self.total, metric))
+
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
         return {
@@ -88,7 +93,7 @@ class Study:
 
     def front(self, metric: str = "max_abs") -> list[int | None]:
         """For each point the number of the one that dominates it, by time and metric; None on the front."""
-        return dominated([p.timing for p in self.points], [getattr(p.total, metric) for p in self.points])
+        return dominated([p.timing for p in self.points], [p.error(metric) for p in self.points])
 
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""

@@ -186,9 +186,9 @@ def test_a_lobe_is_cut_off_before_its_power() -> None:
 def test_lobes_that_are_not_there_are_not_in_the_program() -> None:
     model = BRDFS["lafortune"]
     one, two = model(), model(ks_3=0.25, cy_3=0.5)
-    assert one.asked("light") == {"kd", "ks_1", "cx_1", "cy_1", "cz_1", "exponent_1"}
+    assert one.asked("light") == {"kd", "ks_1", "cx_1", "cz_1", "exponent_1"}
     assert one.asked("ambient") == {"kd"}
-    assert "ks_3" in two.asked("light")
+    assert two.asked("light") >= {"ks_3", "cy_1", "cy_3"}
     assert "ks_2" not in two.asked("light")
     assert "m.ks_3" in two.slots()["lobes"]
     assert "m.ks_2" not in two.slots()["lobes"]

@@ -88,7 +88,7 @@ class TestRender:
     @pytest.mark.parametrize(
         ("arguments", "code", "message"),
         [
-            ((), 2, "Missing argument 'SCENE'"),
+            ((), 2, "Missing argument 'SCENE...'"),
             (("s.toml", "--size", "0x3"), 2, "'0x3' is not a size such as 640x480"),
             (("s.toml", "--size", "3"), 2, "'3' is not a size such as 640x480"),
             (("s.toml", "--size", "200000x3"), 2, "'--size': must be less than or equal to 131072, not 200000"),

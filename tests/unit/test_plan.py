@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 from hypothesis import given
 from strategies import MATERIALS
 
-from glshade import BRDFS, LIGHTS, Image, Plan, Scene, explain
+from glshade import BRDFS, LIGHTS, Image, Mesh, Plan, Scene, explain
 
 SUN = {"type": "directional"}
 LAMP = {"type": "point", "position": [0, 3, 3]}
@@ -104,9 +105,9 @@ def test_no_light_at_all() -> None:
 
 
 def test_exact_counts_up_to_eight() -> None:
-    sources = [len(plan(ball(), [LAMP] * count).programs) for count in (1, 8, 9, 1000)]
-    assert sources == [1, 1, 1, 1]
-    programs = {count: plan(ball(), [LAMP] * count).programs[0] for count in (7, 8, 9, 300, 1000)}
+    found = {count: plan(ball(), [LAMP] * count, film={"encoding": "linear"}).programs for count in (1, 7, 8, 9, 300, 1000)}
+    assert {len(programs) for programs in found.values()} == {1}
+    programs = {count: one for count, (one,) in found.items()}
     assert programs[7] != programs[8] != programs[9]
     assert programs[9] == programs[300] == programs[1000], "one program for any number"
 
@@ -126,6 +127,55 @@ def test_a_closed_mesh_in_a_fitted_view_is_culled() -> None:
     for camera in ({}, {"type": "orthographic"}, {"fov": 90}):
         (program,) = plan(ball(), camera=camera).programs
         assert not program.both_sides
+
+
+def test_what_is_worked_on_afterwards_is_drawn_in_linear_light() -> None:
+    assert plan(ball()).programs[0].encoding == "srgb"
+    blended = {"brdf": "lambert", "alpha_mode": "blend"}
+    film = {"size": [8, 8]}
+    for scene in (
+        plan(ball(), film={**film, "samples": 4}),
+        plan(ball(), film={**film, "background": [0, 0, 0, 0]}),
+        plan(ball(), quality={"storage": "rgba16f"}),
+        plan([ball(), ball(material=blended)]),
+        plan(ball(), [LAMP] * 300),
+    ):
+        assert {program.encoding for program in scene.programs} == {"linear"}
+
+
+def test_vertex_colours_are_for_models_with_a_colour_of_their_own() -> None:
+    mesh = Mesh.build([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]], colours=[[1, 0, 0, 0.5]] * 3)
+    for brdf, alpha in itertools.product(("lambert", "metal"), ("opaque", "mask")):
+        item = {"mesh": mesh, "material": {"brdf": brdf, "alpha_mode": alpha}}
+        (program,) = plan(item, [SUN, SKY]).programs
+        assert program.vertex_colours == (brdf == "lambert" or alpha == "mask")
+        assert program.coloured == (brdf == "lambert")
+        assert program.ambient == ("varying" if brdf == "lambert" else "constant")
+
+
+def test_ambient_light_varies_where_its_own_parameters_do(tmp_path: Any) -> None:
+    Image(np.zeros((2, 2, 3), dtype=np.uint8)).save(tmp_path / "t.png")
+    kd = {"texture": tmp_path / "t.png"}
+    for more, how in (({}, "varying"), ({"ka": 0.5}, "constant")):
+        (program,) = plan(ball(material={"brdf": "phong", "kd": kd, **more}), [SUN, SKY]).programs
+        assert program.ambient == how
+        assert program.textured == ("kd",)
+    # Without flakes their colour does not count.
+    (program,) = plan(ball(material={"brdf": "paint", "flakes": 0, "flake_colour": kd}), [SUN, SKY]).programs
+    assert (program.ambient, program.textured) == ("constant", ())
+
+
+def test_ambient_light_on_black_is_none() -> None:
+    for ka, how in ((0, "none"), (0.1, "constant")):
+        (program,) = plan(ball(material={"brdf": "phong", "ka": ka}), [SUN, SKY]).programs
+        assert program.ambient == how
+
+
+def test_a_mask_that_cuts_nothing_out_is_none() -> None:
+    for alpha, cutoff, mode in ((1, 0.5, "opaque"), (0.5, 0.5, "opaque"), (0.25, 0.5, "mask")):
+        material = {"brdf": "lambert", "alpha_mode": "mask", "alpha": alpha, "alpha_cutoff": cutoff}
+        (program,) = plan(ball(material=material)).programs
+        assert program.alpha == mode
 
 
 def test_sides_may_be_told() -> None:

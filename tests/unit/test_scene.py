@@ -35,7 +35,7 @@ def fault(**keys: Any) -> tuple[str, str]:
 @pytest.mark.parametrize(
     ("keys", "path", "message"),
     [
-        ({"colour": 3}, "colour", "unknown key; allowed: camera, description, film, lights, materials, objects"),
+        ({"colour": 3}, "colour", "unknown key; allowed: animation, camera, cameras, description, film, lights, materials, objects, quality"),
         ({"light": []}, "light", 'unknown key; did you mean "lights"?'),
         ({"film": {"sizes": [1, 1]}}, "film.sizes", 'unknown key; did you mean "size"?'),
         ({"film": {"size": [0, 10]}}, "film.size.0", "must be greater than or equal to 1, not 0"),
@@ -70,7 +70,7 @@ def fault(**keys: Any) -> tuple[str, str]:
         ({"camera": {"type": "orthographic", "height": 0}}, "camera.height", "must be greater than 0, not 0"),
         ({"camera": {"type": "orthographic", "height": "tall"}}, "camera.height", "must be a number, not 'tall'"),
         ({"lights": [{"type": "pont"}]}, "lights.0.type", "unknown type 'pont'; did you mean \"point\"?"),
-        ({"lights": [{}]}, "lights.0", "lacks the key 'type'; allowed: ambient, directional, point, spot"),
+        ({"lights": [{}]}, "lights.0", "lacks the key 'type'; allowed: ambient, directional, gltf_spot, point, spot"),
         ({"lights": ["sun"]}, "lights.0", "must be a table with the key 'type', not 'sun'"),
         ({"lights": {"type": "point"}}, "lights", "must be a list, not {'type': 'point'}"),
         ({"lights": [{"type": "point"}]}, "lights.0.position", "is required"),

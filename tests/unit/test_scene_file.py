@@ -145,7 +145,7 @@ def test_files_are_found_beside_the_scene(tmp_path: Path, monkeypatch: pytest.Mo
     write(tmp_path / "sub" / "a.toml", '[[objects]]\nmesh = "tri.obj"\n')
     monkeypatch.chdir(tmp_path)
     assert load("sub/a.toml").objects[0].mesh == tmp_path / "sub" / "tri.obj"
-    assert load(Path("sub/tri.obj")).objects[0].mesh == Path("sub/tri.obj")
+    assert load(Path("sub/tri.obj")).objects[0].mesh == tmp_path / "sub" / "tri.obj"
 
 
 def test_every_mesh_that_is_missing_or_broken(tmp_path: Path) -> None:

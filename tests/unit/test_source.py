@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import LIGHTS_OF_ANY_TYPE, MATERIALS
 
-from glshade import Image, Renderer, Scene, ShaderError, explain, source
+from glshade import Image, Mesh, Renderer, Scene, ShaderError, explain, source
 from glshade.gl.program import Program
 from glshade.plan import ProgramPlan
 from glshade.source import Source, expand, generate
@@ -191,27 +191,37 @@ def test_the_command_says_the_same(glshade: Any, tmp_path: Path, shaders: Path) 
     assert not (tmp_path / "x.png").exists()
 
 
+def coloured_ball() -> Mesh:
+    """A sphere with vertex colours."""
+    ball = Scene(objects=[{"shape": {"type": "sphere", "segments": 8, "rings": 4}}]).objects[0].shape
+    assert ball is not None
+    mesh = ball.mesh()
+    return Mesh.build(mesh.positions, mesh.triangles, mesh.normals, mesh.uvs, np.full((len(mesh.positions), 4), 0.5))
+
+
 @st.composite
 def scenes(draw: st.DrawFn) -> dict[str, Any]:
-    """Scenes over the features that change programs."""
-    material = draw(MATERIALS).model_dump()
-    material["alpha_mode"] = draw(st.sampled_from(["opaque", "mask", "blend"]))
-    shape = draw(st.sampled_from(["sphere", "plane"]))
-    base = next(iter(material.keys() & {"kd", "ka"}))
+    """Scenes over the features that change programs. Of the material, what is in `textured` is to be a picture."""
+    material = draw(MATERIALS)
+    maps = ["normal_map"] + ["tangent_direction"] * material.anisotropic
+    said = {key: value for key, value in material.model_dump().items() if value is not None}
+    if material.anisotropic and draw(st.booleans()):
+        said["tangent_direction"] = 30.0
     return {
         "objects": [
             {
-                "shape": shape,
-                "material": {key: value for key, value in material.items() if value is not None},
+                **draw(st.sampled_from([{"shape": "sphere"}, {"shape": "plane"}, {"mesh": coloured_ball()}])),
+                "material": {**said, "alpha_mode": draw(st.sampled_from(["opaque", "mask", "blend"]))},
                 "shading": draw(st.sampled_from(["flat", "gouraud", "phong"])),
                 "sides": draw(st.sampled_from(["auto", "front", "both"])),
+                "quality": draw(st.sampled_from([{}, {"normalise": False}, {"arithmetic": "fast"}])),
             }
         ],
         "lights": draw(st.lists(LIGHTS_OF_ANY_TYPE, max_size=4))
         + draw(st.sampled_from([[], [{"type": "point", "position": [0, 9, 0]}] * 9])),
         "camera": {"type": draw(st.sampled_from(["perspective", "orthographic"]))},
         "film": {"size": (4, 4), "samples": draw(st.sampled_from([1, 4]))},
-        "textured": draw(st.sampled_from([(), (base,), ("normal_map",), (base, "normal_map")])),
+        "textured": draw(st.lists(st.sampled_from([*material.parameters(), *maps]), max_size=3)),
     }
 
 
@@ -220,18 +230,21 @@ def declared(stage: str, kind: str) -> set[str]:
     return set(re.findall(rf"^{kind} \w+ (\w+)(?:\[\d+\])?;", stage, re.M))
 
 
-@settings(max_examples=60)
+@pytest.fixture(scope="module")
+def picture(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("pictures") / "t.png"
+    Image(np.full((2, 2, 3), 0.5, dtype=np.float32)).save(path)
+    return path
+
+
+@settings(max_examples=100)
 @given(scene=scenes())
-def test_what_is_declared_is_used(scene: Any, renderer: Renderer, tmp_path_factory: pytest.TempPathFactory) -> None:
+def test_what_is_declared_is_used(scene: Any, renderer: Renderer, picture: Path) -> None:
     """A uniform or an attribute that the driver drops was not needed: the plan has let it slip through."""
     scene = dict(scene)
-    picture = tmp_path_factory.getbasetemp() / "textured.png"
-    if not picture.exists():
-        Image(renderer.render(Scene(objects=[{"shape": "sphere"}], film={"size": (4, 4)})).pixels.copy()).save(picture)
-    for name in scene.pop("textured"):
-        scene["objects"][0]["material"] = scene["objects"][0]["material"] | {name: {"texture": str(picture)}}
-    assume(scene["objects"][0]["material"]["brdf"] == "lambert" or any(light["type"] != "ambient" for light in scene["lights"]))
-    for plan in explain(Scene.model_validate(scene)).programs:
+    (item,) = scene["objects"]
+    item = {**item, "material": {**item["material"], **{name: {"texture": str(picture)} for name in scene.pop("textured")}}}
+    for plan in explain(Scene.model_validate({**scene, "objects": [item]})).programs:
         nothing_unused(plan, renderer)
 
 

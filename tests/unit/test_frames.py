@@ -1,0 +1,104 @@
+"""Which pictures a command makes, and what their files are called."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hypothesis import given
+from hypothesis import strategies as st
+
+from glshade.cli import cli
+from glshade.frames import parse, pictures
+from glshade.image import read
+from glshade.scene_file import SceneFile
+
+SCENE = """
+objects = [ { name = "ball", shape = "cube", material = "red" } ]
+animation = [ { key = "camera.turn", frames = [1, 5], values = [0, 360] },
+  { key = "materials.red.kd", frames = [1, 3], values = [0, 1] } ]
+lights = [ { type = "ambient" } ]
+[materials]
+red = { brdf = "lambert" }
+[film]
+size = [16, 12]
+[cameras]
+top = { eye = [0, 5, 0.1], target = [0, 0, 0] }
+"""
+
+
+@pytest.fixture
+def file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SceneFile:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "s.toml").write_text(SCENE)
+    return SceneFile("s.toml")
+
+
+@given(first=st.integers(-50, 50), count=st.integers(1, 60), step=st.integers(1, 9))
+def test_a_range_is_its_frames(first: int, count: int, step: int) -> None:
+    last = first + count - 1
+    expected = list(range(first, last + 1, step))
+    assert parse(f"{first}-{last}x{step}") == expected
+    assert parse(f"{first}..{last}x{step}") == expected
+
+
+@pytest.mark.parametrize("text", ["", "a", "1-z", "1-10x0"])
+def test_what_is_no_range(text: str) -> None:
+    with pytest.raises(ValueError, match=r"range|frames"):
+        parse(text)
+
+
+def test_names(file: SceneFile) -> None:
+    def names(*arguments: Any) -> list[str]:
+        return [str(picture.output) for picture in pictures([file], *arguments)]
+
+    assert names(None, (), None) == ["s.png"]
+    assert names([1, 20], (), None) == ["s.0001.png", "s.0020.png"]
+    assert names([1], ("top",), None) == ["s.top.0001.png"]
+    assert names([7, -7, 123], (), "out/{scene}_#.exr") == ["out/s_7.exr", "out/s_-7.exr", "out/s_123.exr"]
+    assert names([5], ("top",), "{camera}/##.png") == ["top/05.png"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (([1, 2], (), "x.png"), "lacks #"),
+        ((None, ("a", "b"), "x.png"), "lacks {camera}"),
+        ((None, (), "x.#.png"), "say which, by --frames"),
+        (([1], (), "{frame}.png"), "{frame} is not known"),
+    ],
+)
+def test_names_that_are_none(file: SceneFile, arguments: Any, fault: str) -> None:
+    with pytest.raises(ValueError, match=fault):
+        list(pictures([file], *arguments))
+
+
+def test_the_scene_at_a_frame_through_a_camera(file: SceneFile) -> None:
+    assert file.cameras == ("top",)
+    assert file.scene(2).camera.turn == 90
+    assert file.scene(2).materials["red"].kd == (0.5, 0.5, 0.5)  # type: ignore[attr-defined]
+    assert file.scene(2, "top").camera.eye == (0, 5, 0.1)
+    assert file.scene().camera.turn == 0
+
+
+def test_a_batch(file: SceneFile) -> None:
+    def run(*arguments: str) -> Any:
+        return CliRunner().invoke(cli, ["render", "s.toml", *arguments])
+
+    assert run("-f", "1-3", "-o", "f.##.png").exit_code == 0
+    dark, bright = (read(f"f.{n}.png")[0][..., :3] for n in ("01", "03"))
+    assert dark.max() < bright.max() == 1
+    again = run("-f", "2-4", "-o", "f.##.png")
+    assert again.exit_code == 2
+    assert "f.02.png and 1 more exists" in again.output
+    assert not Path("f.04.png").exists()
+    before = Path("f.02.png").stat().st_mtime_ns
+    skipped = run("-f", "2-4", "-o", "f.##.png", "--skip-existing")
+    assert skipped.output.split() == ["f.04.png"]
+    assert Path("f.02.png").stat().st_mtime_ns == before
+    assert run("-f", "2-4", "-o", "f.##.png", "--overwrite").output.split() == ["f.02.png", "f.03.png", "f.04.png"]
+    assert run("-f", "2", "-o", "f.##.png").exit_code == 0, "one picture replaces its file"
+    assert np.array_equal(read("f.03.png")[0][..., :3], bright)

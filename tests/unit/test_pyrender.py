@@ -1,0 +1,500 @@
+"""Scenes of pyrender drawn by glshade: what maps to what, on stand-ins; and pyrender's own pictures, where it can draw."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+import os
+import subprocess
+import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import glshade
+from glshade import BRDFS, LIGHTS, GlshadeError, SceneError, from_pyrender
+from glshade.mesh_file import AssetWarning
+from glshade.pyrender import OffscreenRenderer, RenderFlags
+from glshade.pyrender.scene import mesh
+from glshade.texture import NormalMap, Texture
+
+WIDTH, HEIGHT = 64, 48
+
+
+class Thing:
+    """An object of pyrender's: known by its attributes."""
+
+    def __init__(self, **attributes: Any) -> None:
+        self.__dict__.update(attributes)
+
+
+def texture(source: Any, wrap_s: int = 10497, wrap_t: int = 10497) -> Thing:
+    return Thing(source=np.asarray(source, dtype=np.uint8), sampler=Thing(wrapS=wrap_s, wrapT=wrap_t))
+
+
+def surface(**changes: Any) -> dict[str, Any]:
+    return {
+        **{"name": None, "normalTexture": None, "occlusionTexture": None, "emissiveTexture": None},
+        **{"emissiveFactor": np.zeros(3), "alphaMode": "OPAQUE", "alphaCutoff": 0.5, "doubleSided": False, "wireframe": False},
+        **changes,
+    }
+
+
+def rough(**changes: Any) -> Thing:
+    """A MetallicRoughnessMaterial."""
+    own = {"baseColorFactor": np.ones(4), "baseColorTexture": None, "metallicFactor": 0.0, "roughnessFactor": 0.5}
+    return Thing(**surface(**{**own, "metallicRoughnessTexture": None, **changes}))
+
+
+def glossy(**changes: Any) -> Thing:
+    """A SpecularGlossinessMaterial, whose glossinessFactor calls itself without end."""
+    own = {"diffuseFactor": np.ones(4), "diffuseTexture": None, "specularFactor": np.full(3, 0.25), "_glossinessFactor": 0.75}
+    return Thing(**surface(**{**own, "specularGlossinessTexture": None, **changes}))
+
+
+SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=np.float32)
+FACES = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.float32)  # pyrender keeps indices as floats
+
+
+def square(material: Thing | None = None, **changes: Any) -> Thing:
+    """A Primitive: two metres wide in z = 0, seen from +z."""
+    given = {"positions": SQUARE, "indices": FACES, "normals": None, "texcoord_0": (SQUARE[:, :2] + 1) / 2, "color_0": None}
+    return Thing(**{**given, "mode": 4, "poses": None, "material": material or rough(), **changes})
+
+
+def moved(x: float = 0, y: float = 0, z: float = 0, turn: Any = None) -> Any:
+    pose = np.eye(4)
+    pose[:3, 3] = x, y, z
+    if turn is not None:
+        pose[:3, :3] = turn
+    return pose
+
+
+def node(*primitives: Thing, pose: Any = None, visible: bool = True, name: str | None = None) -> Thing:
+    pose = np.eye(4) if pose is None else pose
+    return Thing(mesh=Thing(primitives=list(primitives), is_visible=visible), pose=pose, name=name)
+
+
+def perspective(yfov: float = 1.0, aspect: float | None = None, near: float = 0.1, far: float | None = 50.0) -> Thing:
+    return Thing(yfov=yfov, aspectRatio=aspect, znear=near, zfar=far, name=None)
+
+
+def stage(*nodes: Thing, camera: Thing | None = None, at: Any = None, **changes: Any) -> Thing:
+    """A Scene: from 4 m in front unless told otherwise."""
+    seen_from = Thing(camera=camera or perspective(), pose=moved(z=4) if at is None else at, name=None)
+    own = {"mesh_nodes": set(nodes), "main_camera_node": seen_from, "bg_color": np.ones(4), "ambient_light": np.zeros(3)}
+    dark: dict[str, set[Thing]] = {f"{kind}_light_nodes": set() for kind in ("directional", "point", "spot")}
+    return Thing(**{**own, **dark, "get_pose": lambda node: node.pose, **changes})
+
+
+@pytest.fixture(scope="module")
+def offscreen() -> Iterator[OffscreenRenderer]:
+    renderer = OffscreenRenderer(WIDTH, HEIGHT)
+    yield renderer
+    renderer.delete()
+
+
+def the_material(primitive: Thing) -> Any:
+    return from_pyrender(stage(node(primitive))).objects[0].material
+
+
+# --- the mapping ------------------------------------------------------------------------------------------------------
+
+
+def test_pyrender_is_not_imported(python: Any) -> None:
+    assert python("import sys, glshade; glshade.from_pyrender; print('pyrender' in sys.modules)") == "False"
+
+
+def test_metallic_roughness_is_ggx() -> None:
+    made = the_material(
+        square(rough(baseColorFactor=np.array([0.5, 0.25, 2.0, 1.0]), metallicFactor=0.25, roughnessFactor=0.75))
+    )
+    assert made == BRDFS["ggx"](kd=(0.5, 0.25, 1.0), metallic=0.25, roughness=0.75, sides="front")
+    assert the_material(square(rough(doubleSided=True))).sides == "both"
+
+
+def test_specular_glossiness_is_ggx() -> None:
+    made = the_material(square(glossy(diffuseFactor=np.array([0.5, 0.25, 1.0, 1.0]))))
+    assert made == BRDFS["ggx"](kd=(0.375, 0.1875, 0.75), f0=0.25, metallic=0.0, roughness=0.25, sides="front")
+
+
+def test_a_texture_is_a_file_and_equal_ones_are_one() -> None:
+    codes = np.random.default_rng(0).integers(0, 255, (3, 5, 4))
+    codes[..., 3] = 255
+    one, other = (the_material(square(rough(baseColorTexture=texture(codes, 33071, 33648)))).kd for _ in range(2))
+    assert isinstance(one, Texture)
+    assert one.texture == other.texture
+    assert one.wrap == ("clamp", "mirror")
+    pixels, _ = glshade.image.read(one.texture, "linear")
+    np.testing.assert_array_equal(np.rint(pixels * 255), codes)
+
+
+def test_roughness_is_in_red_and_metallic_in_green() -> None:
+    """pyrender uploads glTF's green and blue as two channels."""
+    codes = np.stack([np.full((2, 2), 51), np.full((2, 2), 102)], axis=-1)
+    made = the_material(square(rough(metallicRoughnessTexture=texture(codes), metallicFactor=1.0)))
+    for picture, channel, code in ((made.roughness, 0, 51), (made.metallic, 1, 102)):
+        assert picture.channel == "rg"[channel]
+        assert np.rint(glshade.image.read(picture.texture, "linear")[0][..., channel] * 255) == pytest.approx(code)
+
+
+def test_a_normal_map_is_one() -> None:
+    assert isinstance(the_material(square(rough(normalTexture=texture(np.full((2, 2, 3), 128))))).normal_map, NormalMap)
+    without = the_material(square(rough(normalTexture=texture(np.full((2, 2, 3), 128))), texcoord_0=None))
+    assert without.normal_map is None
+
+
+def test_only_what_lets_light_through_is_blended() -> None:
+    """pyrender blends whatever it makes of a trimesh."""
+    assert the_material(square(rough(alphaMode="BLEND"))).alpha_mode == "opaque"
+    glass = np.array([1, 1, 1, 0.5])
+    assert the_material(square(rough(alphaMode="BLEND", baseColorFactor=glass))).alpha == 0.5
+    holes = texture([[[255, 255, 255, 255], [255, 255, 255, 0]]])
+    colours = np.array([[1, 1, 1, 0.5]] * 4, dtype=np.float32)
+    for see_through in (
+        square(rough(alphaMode="BLEND", baseColorFactor=glass)),
+        square(rough(alphaMode="BLEND", baseColorTexture=holes)),
+        square(rough(alphaMode="BLEND"), color_0=colours),
+    ):
+        assert the_material(see_through).alpha_mode == "blend"
+    masked = the_material(square(rough(alphaMode="MASK", alphaCutoff=0.25, baseColorTexture=holes)))
+    assert (masked.alpha_mode, masked.alpha_cutoff) == ("mask", 0.25)
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"emissiveFactor": np.ones(3)}, "emission not used"),
+        ({"occlusionTexture": texture(np.ones((2, 2)))}, "ambient occlusion not used"),
+        ({"wireframe": True}, "wireframes are drawn solid"),
+    ],
+)
+def test_what_a_material_has_besides_is_warned_of(changes: dict[str, Any], message: str) -> None:
+    with pytest.warns(AssetWarning, match=message):
+        from_pyrender(stage(node(square(rough(**changes)))))
+
+
+@pytest.mark.parametrize(
+    ("mode", "order", "triangles"),
+    [
+        (4, [0, 1, 2, 2, 3, 0], [[0, 1, 2], [2, 3, 0]]),
+        (4, None, [[0, 1, 2]]),
+        (5, [0, 1, 3, 2], [[0, 1, 3], [3, 1, 2]]),
+        (6, [0, 1, 2, 3], [[0, 1, 2], [0, 2, 3]]),
+    ],
+)
+def test_triangles_strips_and_fans(mode: int, order: Any, triangles: Any) -> None:
+    made = mesh(square(mode=mode, indices=None if order is None else np.array(order, dtype=np.float32)))
+    assert made is not None
+    # A triangle may start at any of its corners.
+    turned = [[list(np.roll(t, -int(np.argmin(t)))) for t in some] for some in (made.triangles, triangles)]
+    assert turned[0] == turned[1]
+
+
+def test_points_and_lines_are_left_out_and_said() -> None:
+    with pytest.warns(AssetWarning, match="points are not drawn"):
+        scene = from_pyrender(stage(node(square(mode=0), square())))
+    assert len(scene.objects) == 1
+    with pytest.warns(AssetWarning, match="lines are not drawn"), pytest.raises(SceneError, match="no visible triangles"):
+        from_pyrender(stage(node(square(mode=3))))
+
+
+def test_a_primitive_is_read_again_when_it_has_new_arrays() -> None:
+    given = square()
+    first = mesh(given)
+    assert mesh(given) is first
+    given.positions = SQUARE * 2
+    again = mesh(given)
+    assert again is not None
+    assert again.positions.max() == 2
+
+
+def test_instances_and_invisible_meshes() -> None:
+    poses = np.stack([moved(x=1), moved(y=2), np.zeros((4, 4))])
+    scene = from_pyrender(stage(node(square(poses=poses), pose=moved(z=3)), node(square(), visible=False)))
+    # The third is flattened, and covers nothing.
+    places = {tuple(item.transform.array()[:3, 3]) for item in scene.objects}
+    assert places == {(1, 0, 3), (0, 2, 3)}
+
+
+def test_lights_keep_their_photometric_units() -> None:
+    sun = Thing(color=np.array([1, 0.5, 0.25]), intensity=math.pi, name="sun")
+    lamp = Thing(color=np.ones(3), intensity=2 * math.pi, name=None)
+    spot = Thing(color=np.ones(3), intensity=3 * math.pi, name=None, innerConeAngle=0.25, outerConeAngle=0.5)
+    down = np.array([[1, 0, 0], [0, 0, 1], [0, -1, 0]])
+    found = from_pyrender(
+        stage(
+            node(square()),
+            ambient_light=np.array([0.1, 0.2, 0.3]),
+            directional_light_nodes={Thing(light=sun, pose=moved(turn=down))},
+            point_light_nodes={Thing(light=lamp, pose=moved(1, 2, 3))},
+            spot_light_nodes={Thing(light=spot, pose=moved(4, 5, 6))},
+        )
+    ).lights
+    assert found is not None
+    ambient, directional, point, cone = (light.model_dump() for light in found)
+    assert (ambient["type"], ambient["colour"]) == ("ambient", (0.1, 0.2, 0.3))
+    # A white Lambertian reflects E / pi, and a light's intensity is what that shows.
+    assert (directional["intensity"], directional["direction"]) == (pytest.approx(1), (0, -1, 0))
+    assert (point["intensity"], point["position"], point["falloff"]) == (pytest.approx(2), (1, 2, 3), "1/r^2")
+    assert (cone["type"], cone["direction"]) == ("gltf_spot", (0, 0, -1))
+    assert (cone["inner"], cone["outer"]) == (pytest.approx(math.degrees(0.25)), pytest.approx(math.degrees(0.5)))
+
+
+@pytest.mark.parametrize(("inner", "outer"), [(0.0, 0.785), (0.2, 0.5), (0.3, 0.3), (0.0, math.pi / 2)])
+def test_a_spot_fades_as_in_pyrenders_shader(inner: float, outer: float) -> None:
+    light: Any = LIGHTS["gltf_spot"].model_validate(
+        {"position": (0, 0, 0), "direction": (0, 0, -1), "inner": math.degrees(inner), "outer": math.degrees(outer)}
+    )
+    angle = np.linspace(0, 1.6, 99)
+    p = 2 * np.stack([np.sin(angle), np.zeros(99), -np.cos(angle)], axis=-1)
+    _, e = type(light).illuminate(Thing(**light.uniforms(np.zeros(3))), p)
+    # renderer.py and mesh.frag
+    scale = 1.0 / max(0.001, np.cos(inner) - np.cos(outer))
+    attenuation = np.clip(np.clip(np.cos(angle), 0, 1) * scale - np.cos(outer) * scale, 0, 1) ** 2
+    np.testing.assert_allclose(e, attenuation[:, None] * np.ones(3), atol=1e-9)
+
+
+def test_a_background_is_shown_as_it_is() -> None:
+    colour = np.array([0.2, 0.4, 0.6, 1.0])
+    film = from_pyrender(stage(node(square()), bg_color=colour)).film
+    assert glshade.image.linear_to_srgb(np.array(film.background)) == pytest.approx(colour[:3], abs=1e-6)
+    assert len(from_pyrender(stage(node(square()), bg_color=np.array([0.2, 0.4, 0.6, 0.5]))).film.background) == 4
+
+
+def test_a_scaled_camera_is_refused() -> None:
+    with pytest.raises(SceneError, match="scaled or sheared"):
+        from_pyrender(stage(node(square()), at=np.diag([2.0, 2, 2, 1])))
+
+
+# --- the drop-in ------------------------------------------------------------------------------------------------------
+
+TILTED = np.array([[0.8, 0, 0.6], [0, 1, 0], [-0.6, 0, 0.8]])
+INTRINSICS = Thing(fx=70.0, fy=55.0, cx=25.0, cy=30.0, znear=0.1, zfar=50.0, name=None)
+CAMERAS = {
+    "perspective": (perspective(), np.array([HEIGHT / 2 / math.tan(0.5)] * 2), (WIDTH / 2, HEIGHT / 2)),
+    "endless": (perspective(far=None), np.array([HEIGHT / 2 / math.tan(0.5)] * 2), (WIDTH / 2, HEIGHT / 2)),
+    "wide pixels": (
+        perspective(aspect=2.0),
+        np.array([WIDTH / 4, HEIGHT / 2]) / math.tan(0.5),
+        (WIDTH / 2, HEIGHT / 2),
+    ),
+    "intrinsics": (INTRINSICS, np.array([70.0, 55.0]), (25.0, 30.0)),
+}
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+def test_depth_is_where_the_ray_of_each_pixel_meets_the_plane(offscreen: OffscreenRenderer, name: str) -> None:
+    camera, focal, middle = CAMERAS[name]
+    depth = offscreen.render(stage(node(square(), pose=moved(turn=TILTED)), camera=camera), RenderFlags.DEPTH_ONLY)
+    assert depth.shape == (HEIGHT, WIDTH)
+    assert depth.dtype == np.float32
+    x = (np.arange(WIDTH) + 0.5 - middle[0]) / focal[0]
+    y = -(np.arange(HEIGHT) + 0.5 - middle[1])[:, None] / focal[1]
+    # From (0, 0, 4) along (x, y, -1) t to the plane through the origin.
+    n = TILTED[:, 2]
+    t = 4 * n[2] / (n[2] - n[0] * x - n[1] * y)
+    p = np.stack(np.broadcast_arrays(t * x, t * y, 4 - t), axis=-1) @ TILTED
+    inside = np.abs(p[..., :2]).max(axis=-1) < 1
+    assert inside.sum() > 200
+    np.testing.assert_array_equal(depth > 0, inside)
+    np.testing.assert_allclose(depth[inside], t[inside], rtol=1e-6)
+
+
+def test_depth_of_an_orthographic_view(offscreen: OffscreenRenderer) -> None:
+    """pyrender itself undoes a perspective there that has not taken place."""
+    camera = Thing(xmag=9.0, ymag=1.5, znear=0.1, zfar=50.0, name=None)
+    depth = offscreen.render(stage(node(square(), pose=moved(turn=TILTED)), camera=camera), RenderFlags.DEPTH_ONLY)
+    x = (np.arange(WIDTH) + 0.5 - WIDTH / 2) * 3 / HEIGHT
+    expected = np.broadcast_to(4 + x * TILTED[0, 2] / TILTED[2, 2], depth.shape)
+    assert (depth > 0).sum() > 500
+    np.testing.assert_allclose(depth[depth > 0], expected[depth > 0], rtol=1e-6)
+
+
+def test_segments_are_the_nodes_that_are_named(offscreen: OffscreenRenderer) -> None:
+    left, right, hidden = node(square(), pose=moved(-1.2)), node(square(), pose=moved(1.2)), node(square(), pose=moved(z=1))
+    colour, depth = offscreen.render(stage(left, right, hidden), RenderFlags.SEG, {left: 20, right: (1, 2, 3)})
+    assert colour.dtype == np.uint8
+    assert {tuple(c) for c in colour.reshape(-1, 3)} == {(0, 0, 0), (20, 20, 20), (1, 2, 3)}
+    assert tuple(colour[HEIGHT // 2, 15]) == (20, 20, 20)
+    assert tuple(colour[HEIGHT // 2, 50]) == (1, 2, 3)
+    np.testing.assert_array_equal(depth > 0, colour.any(axis=2))
+    assert depth[depth > 0] == pytest.approx(4, rel=1e-6)
+
+
+def test_flat_shows_base_colours_as_they_are(offscreen: OffscreenRenderer) -> None:
+    codes = np.full((2, 2, 4), 200)
+    codes[..., 3] = 255
+    primitive = square(
+        rough(baseColorFactor=np.array([1, 0.5, 0.25, 1]), baseColorTexture=texture(codes)),
+        color_0=np.full((4, 4), 0.8, dtype=np.float32),
+    )
+    colour, _ = offscreen.render(stage(node(primitive)), RenderFlags.FLAT)
+    assert tuple(colour[HEIGHT // 2, WIDTH // 2]) == (160, 80, 40)
+    assert tuple(colour[0, 0]) == (255, 255, 255)
+
+
+def test_light_is_encoded_with_a_power(offscreen: OffscreenRenderer) -> None:
+    """pyrender's own: base colour times ambient light, to the power of 1 / 2.2."""
+    scene = stage(node(square(rough(baseColorFactor=np.array([0.5, 0.2, 0.8, 1])))), ambient_light=np.full(3, 0.5))
+    colour, _ = offscreen.render(scene)
+    expected = np.rint(255 * np.array([0.25, 0.1, 0.4]) ** (1 / 2.2))
+    assert tuple(colour[HEIGHT // 2, WIDTH // 2]) == tuple(expected)
+
+
+def test_rgba_and_the_background(offscreen: OffscreenRenderer) -> None:
+    scene = stage(node(square()), bg_color=np.array([0.2, 0.3, 0.4, 0.0]))
+    colour, depth = offscreen.render(scene, RenderFlags.RGBA)
+    assert colour.shape == (HEIGHT, WIDTH, 4)
+    assert tuple(colour[0, 0]) == (51, 76, 102, 0)
+    assert tuple(colour[HEIGHT // 2, WIDTH // 2]) == (0, 0, 0, 255)
+    assert depth[0, 0] == 0
+
+
+def test_cut_outs_have_no_depth(offscreen: OffscreenRenderer) -> None:
+    codes = np.full((1, 2, 4), 255)
+    codes[0, 1, 3] = 0
+    masked = rough(alphaMode="MASK", baseColorTexture=texture(codes, 33071, 33071))
+    colour, depth = offscreen.render(stage(node(square(masked)), bg_color=np.ones(4)))
+    assert depth[HEIGHT // 2, 25] > 0
+    assert depth[HEIGHT // 2, 39] == 0
+    assert colour[HEIGHT // 2, 39].tolist() == [255] * 3
+
+
+def test_back_faces(offscreen: OffscreenRenderer) -> None:
+    away = moved(turn=np.diag([-1, 1, -1]))
+    assert not offscreen.render(stage(node(square(), pose=away)), RenderFlags.DEPTH_ONLY).any()
+    assert offscreen.render(stage(node(square(rough(doubleSided=True)), pose=away)), RenderFlags.DEPTH_ONLY).any()
+    skipped = RenderFlags.DEPTH_ONLY | RenderFlags.SKIP_CULL_FACES
+    assert offscreen.render(stage(node(square(), pose=away)), int(skipped)).any()
+
+
+def test_nothing_to_draw_is_background(offscreen: OffscreenRenderer) -> None:
+    colour, depth = offscreen.render(stage(bg_color=np.array([1, 0, 0, 1.0])))
+    assert (colour == [255, 0, 0]).all()
+    assert not depth.any()
+
+
+def test_what_is_drawn_with_lines_is_an_error(offscreen: OffscreenRenderer) -> None:
+    for flag in ("VERTEX_NORMALS", "FACE_NORMALS", "ALL_WIREFRAME", "FLIP_WIREFRAME"):
+        with pytest.raises(GlshadeError, match=f"{flag}: glshade draws no lines"):
+            offscreen.render(stage(node(square())), RenderFlags[flag] | RenderFlags.RGBA)
+
+
+def test_shadows_are_left_out_and_said_once(offscreen: OffscreenRenderer) -> None:
+    with pytest.warns(UserWarning, match="not local shading"):
+        offscreen.render(stage(node(square())), RenderFlags.SHADOWS_ALL)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        offscreen.render(stage(node(square())), RenderFlags.SHADOWS_SPOT)
+
+
+def test_a_scene_without_a_camera() -> None:
+    blind = stage(node(square()))
+    blind.main_camera_node = None
+    assert from_pyrender(blind).camera.framing
+    renderer = OffscreenRenderer(8, 8)
+    with pytest.raises(SceneError, match="no camera"):
+        renderer.render(blind)
+    renderer.delete()
+
+
+def test_the_viewport_can_change_and_a_renderer_can_go() -> None:
+    renderer = OffscreenRenderer(8, 8, point_size=2.0)
+    assert renderer.point_size == 2.0
+    renderer.viewport_width, renderer.viewport_height = 20, 10
+    colour, depth = renderer.render(stage(node(square())))
+    assert (colour.shape, depth.shape) == ((10, 20, 3), (10, 20))
+    renderer.delete()
+    renderer.delete()
+    with pytest.raises(GlshadeError, match="deleted"):
+        renderer.render(stage(node(square())))
+
+
+# --- beside pyrender itself -------------------------------------------------------------------------------------------
+
+# The same lines for both: `argv[1]` says whose renderer draws.
+BESIDE = """
+import sys
+import numpy as np
+import pyrender
+import trimesh
+if sys.argv[1] == "glshade":
+    from glshade.pyrender import OffscreenRenderer, RenderFlags
+else:
+    from pyrender import OffscreenRenderer, RenderFlags
+
+def look(x, y, z):
+    back = np.array([x, y, z]) / np.linalg.norm([x, y, z])
+    right = np.cross([0, 0, 1], back) / np.linalg.norm(np.cross([0, 0, 1], back))
+    return np.vstack([np.column_stack([right, np.cross(back, right), back, [x, y, z]]), [0, 0, 0, 1]])
+
+scene = pyrender.Scene(bg_color=[0.2, 0.3, 0.4], ambient_light=[0.02, 0.02, 0.02])
+for roughness, metallic, x in ((0.3, 0.0, -0.6), (0.5, 1.0, 0.6)):
+    material = pyrender.MetallicRoughnessMaterial(
+        baseColorFactor=[0.8, 0.4, 0.2, 1.0], roughnessFactor=roughness, metallicFactor=metallic)
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=0.5)
+    scene.add(pyrender.Mesh.from_trimesh(ball, material=material), pose=trimesh.transformations.translation_matrix([x, 0, 0]))
+scene.add(pyrender.DirectionalLight(intensity=2.0), pose=look(-1, -2, 2))
+scene.add(pyrender.PointLight(color=[1, 0.5, 0.2], intensity=2.0), pose=look(1, -1, 1))
+scene.add(pyrender.SpotLight(color=[0.2, 0.5, 1.0], intensity=20.0), pose=look(-1, -2, -1))
+scene.add(pyrender.IntrinsicsCamera(fx=300, fy=280, cx=150, cy=130, znear=0.1, zfar=10.0), pose=look(0, -2.5, 0.3))
+renderer = OffscreenRenderer(320, 240)
+colour, _ = renderer.render(scene)
+nodes = sorted(scene.mesh_nodes, key=lambda node: node.matrix[0, 3])
+segments, depth = renderer.render(scene, RenderFlags.SEG, {node: 100 * (i + 1) for i, node in enumerate(nodes)})
+np.savez(sys.argv[2], colour=colour, segments=segments, depth=depth)
+"""
+
+
+@pytest.fixture(scope="module")
+def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[Any, Any]:
+    """(pyrender's, glshade's) pictures of one scene, each drawn in a process of its own."""
+    if importlib.util.find_spec("pyrender") is None:
+        pytest.skip("pyrender is not installed: pip install 'glshade[pyrender]'")
+    folder: Path = tmp_path_factory.mktemp("beside")
+    found = []
+    for who in ("pyrender", "glshade"):
+        path = folder / f"{who}.npz"
+        run = subprocess.run(
+            [sys.executable, "-c", BESIDE, who, str(path)],
+            capture_output=True,
+            text=True,
+            env={**os.environ, "PYOPENGL_PLATFORM": "egl"},
+            timeout=120,
+            check=False,
+        )
+        if who == "pyrender" and run.returncode:
+            pytest.skip(f"pyrender cannot draw here: {(run.stderr.strip().splitlines() or ['it says nothing'])[-1]}")
+        assert run.returncode == 0, run.stderr
+        found.append(np.load(path))
+    return found[0], found[1]
+
+
+def test_depth_and_segments_are_pyrenders(both: tuple[Any, Any]) -> None:
+    """With SEG it draws one sample in the middle of each pixel."""
+    theirs, ours = both
+    np.testing.assert_array_equal(ours["segments"], theirs["segments"])
+    np.testing.assert_array_equal(ours["depth"] > 0, theirs["depth"] > 0)
+    seen = ours["depth"] > 0
+    assert seen.sum() > 10000
+    z = ours["depth"][seen].astype(np.float64)
+    # A step of its 24-bit depth, from 0.1 m to 10 m: z^2 (far - near) / (far near) / 2^24.
+    step = z**2 * (10 - 0.1) / (10 * 0.1) / 2**24
+    steps = np.abs(theirs["depth"][seen] - z) / step
+    assert np.percentile(steps, 99) < 4
+
+
+def test_colours_are_nearly_pyrenders(both: tuple[Any, Any]) -> None:
+    theirs, ours = both
+    difference = np.abs(ours["colour"].astype(int) - theirs["colour"]).max(axis=2)
+    background = ours["colour"] == ours["colour"][0, 0]
+    np.testing.assert_array_equal(ours["colour"][0, 0], theirs["colour"][0, 0])
+    lit = difference[~background.all(axis=2)]
+    # Its G has another k, 0.96 dims its diffuse part, and 0.001 its highlights: see docs/pyrender.md.
+    assert np.median(lit) <= 6
+    assert np.percentile(lit, 95) <= 12
