@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
@@ -18,15 +18,18 @@ from glshade.image import probe
 from glshade.scene import Scene
 from glshade.texture import Picture
 
+if TYPE_CHECKING:
+    from glshade.override import Overrides
+
 TEXT_SUFFIXES = (".toml", ".json")
 
 
-def load(path: str | Path, overrides: Mapping[str, Any] | None = None) -> Scene:
+def load(path: str | Path, overrides: Overrides = ()) -> Scene:
     """The scene in a file, with its meshes read.
 
     A mesh file is framed by a camera, lit by the default rig and drawn in its own material. overrides: values in place of the
-    file's, by dotted keys such as "materials.body.roughness" or "objects.ball.shading", in their order. Errors: SceneError with
-    every fault: file, key path, what is allowed.
+    file's, in their order, by dotted keys such as "materials.body.roughness" or "objects.ball.shading"; or pairs of key and
+    text, as `--set KEY=VALUE` has them. Errors: SceneError with every fault: file, key path, what is allowed.
     """
     return SceneFile(path, overrides).scene()
 
@@ -37,7 +40,7 @@ class SceneFile:
     Errors: SceneError, for what cannot be read, and for overrides that lead nowhere.
     """
 
-    def __init__(self, path: str | Path, overrides: Mapping[str, Any] | None = None) -> None:
+    def __init__(self, path: str | Path, overrides: Overrides = ()) -> None:
         self.path = Path(path)
         suffix = self.path.suffix.lower()
         if suffix in mesh_file.SUFFIXES:
@@ -51,6 +54,7 @@ class SceneFile:
             known = ", ".join([*TEXT_SUFFIXES, *sorted(mesh_file.SUFFIXES)])
             raise SceneError(f"{self.path}: {suffix or 'no extension'} is neither a scene nor a mesh; known: {known}")
         self.document = _overridden(document, overrides, self.path)
+        self._as_written = self.document is document
         self._checked: set[Path] = set()
 
     @cached_property
@@ -61,8 +65,21 @@ class SceneFile:
     def scene(self, frame: float | None = None, camera: str | None = None) -> Scene:
         """The scene at a frame, as it is written where that is None, through one of its cameras.
 
-        Errors: SceneError with every fault.
+        Errors: SceneError with every fault; those that the file alone does not have say that they came with --set.
         """
+        try:
+            return self._scene(frame, camera)
+        except SceneError as error:
+            if self._as_written:
+                raise
+            own: tuple[str, ...] = ()
+            try:
+                SceneFile(self.path)._scene(frame, camera)
+            except SceneError as written:
+                own = written.problems
+            raise SceneError([fault if fault in own else f"{fault} (from --set)" for fault in error.problems]) from None
+
+    def _scene(self, frame: float | None, camera: str | None) -> Scene:
         document = self.document
         if frame is not None:
             document = self._at(frame)
@@ -107,14 +124,19 @@ class SceneFile:
             raise SceneError(problems)
 
 
-def _overridden(document: Any, overrides: Mapping[str, Any] | None, path: Path) -> Any:
-    """Errors: SceneError for a key that leads nowhere."""
-    if not overrides:
+def _overridden(document: Any, overrides: Overrides, path: Path) -> Any:
+    """The same document where there is nothing to override. Errors: SceneError for a key that leads nowhere."""
+    # What is no table is a fault of the file, and reported as such.
+    if not overrides or not isinstance(document, Mapping):
         return document
-    from glshade.override import OverrideError, apply
+    from glshade.override import OverrideError, apply, pairs
 
+    try:
+        values = pairs(overrides)
+    except ValueError as error:
+        raise SceneError(f"{path}: --set {error}") from None
     problems = []
-    for key, value in overrides.items():
+    for key, value in values:
         try:
             document = apply(document, key, value)
         except OverrideError as error:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,25 +32,27 @@ class Size(click.ParamType[tuple[int, int]]):
 
 
 def overrides(command: Any) -> Any:
-    """The option --set, which gives `overrides`: dotted key -> value."""
+    """The option --set, which gives `overrides`: (key, text), as `glshade.load` takes them."""
     return click.option(
         "--set",
         "overrides",
         multiple=True,
         metavar="KEY=VALUE",
-        callback=lambda ctx, param, texts: _parsed(texts, "--set"),
+        callback=lambda ctx, param, texts: _assignments(texts, param),
         help="Puts a value in the place of the scene's: quality.fresnel=schlick, materials.body.roughness=0.3, "
-        "objects.ball.material=gold, film.size=[640,360].",
+        "objects.ball.material=gold, lights.0.intensity=2, film.size=[640,360]; repeatable.",
     )(command)
 
 
-def _parsed(texts: tuple[str, ...], option: str) -> dict[str, Any]:
-    from glshade.override import parse
+def _assignments(texts: tuple[str, ...], option: click.Parameter) -> list[tuple[str, str]]:
+    if not texts:
+        return []
+    from glshade.override import split
 
     try:
-        return dict(parse(text) for text in texts)
+        return [split(text) for text in texts]
     except ValueError as error:
-        raise click.BadParameter(str(error), param_hint=f"'{option}'") from None
+        raise click.BadParameter(str(error), param=option) from None
 
 
 @click.command()
@@ -97,7 +100,7 @@ def command(
     size: tuple[int, int] | None,
     samples: str | None,
     shading: Any,
-    overrides: dict[str, Any],
+    overrides: list[tuple[str, str]],
     reference: bool,
     exposure: float | None,
     budget: tuple[str, ...],
@@ -119,7 +122,6 @@ def command(
     if (limits or deadline) and (reference or shading or (limits and deadline)):
         raise click.UsageError("--budget and --deadline choose the settings: not together, nor with --shading or --reference")
     film = {"size": size, "samples": samples and int(samples), "exposure": exposure}
-    changes = {key: value for key, value in film.items() if value is not None}
     wanted = _pictures([SceneFile(path, overrides) for path in scenes], frames, cameras, output)
     if skip_existing:
         wanted = [picture for picture in wanted if not picture.output.exists()]
@@ -132,7 +134,7 @@ def command(
         return
 
     def loaded(picture: Picture) -> Scene:
-        return _filmed(picture.scene.scene(picture.frame, picture.camera), changes)
+        return filmed(picture.scene.scene(picture.frame, picture.camera), film)
 
     # Only a scene without faults is worth a context.
     first = loaded(wanted[0])
@@ -175,8 +177,9 @@ def _pictures(files: list[SceneFile], frames: str | None, cameras: tuple[str, ..
         raise click.BadParameter(str(error), param_hint="'--output'") from None
 
 
-def _filmed(scene: Scene, changes: dict[str, Any]) -> Scene:
-    """The scene on another film."""
+def filmed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
+    """The scene on another film; None changes nothing. Errors: click.BadParameter, of the option named as the film's key."""
+    changes = {key: value for key, value in changes.items() if value is not None}
     if not changes:
         return scene
     from pydantic import ValidationError

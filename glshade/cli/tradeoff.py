@@ -32,7 +32,7 @@ Progress = Callable[[str, int, int], None]
     show_default=True,
     help="Of the front that is printed, and that the page begins with.",
 )
-@click.option("--repeat", type=click.IntRange(1, 1000), help="Timings of each setting, taken in turn. [default: 9]")
+@click.option("--repeat", type=click.IntRange(1, 1000), help="Timings of each setting, taken in turn. [default: 15]")
 @click.option("--size", type=Size(), help="Overrides the film's size [pixels].")
 @overrides
 @click.option("--again", is_flag=True, help="Measures anew what the folder holds already.")

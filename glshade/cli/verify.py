@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from glshade.cli.render import Size, overrides
+from glshade.cli.render import Size, filmed, overrides
 
 if TYPE_CHECKING:
     from glshade.scene import Scene
@@ -43,7 +43,7 @@ def command(
     device: int | None,
     size: tuple[int, int] | None,
     shading: Any,
-    overrides: dict[str, Any],
+    overrides: list[tuple[str, str]],
     report: Path | None,
     as_json: bool,
     max_ambiguous: float,
@@ -61,9 +61,7 @@ def command(
         raise click.UsageError("Missing argument 'SCENE'.")
     from glshade.scene_file import load
 
-    loaded = load(scene, overrides)
-    if size is not None:
-        loaded = loaded.model_copy(update={"film": loaded.film.model_copy(update={"size": size})})
+    loaded = filmed(load(scene, overrides), {"size": size})
     if mutate is not None:
         _mutate(loaded, mutate, backend, device, shading, as_json)
         return

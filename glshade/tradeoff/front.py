@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Timing:
-    """Of one setting [s]: the median of the repetitions, and the quartiles as its range."""
+    """Of one setting [s]: the median of the repetitions, and the range in which it would lie nineteen times of twenty."""
 
     median: float
     low: float
@@ -21,21 +21,22 @@ def ties(one: Timing, other: Timing) -> bool:
 
 
 def dominated(timings: Sequence[Timing], errors: Sequence[float]) -> list[int | None]:
-    """For each point the one that dominates it, None for those on the front.
+    """For each point the one on the front that dominates it, None for those on the front.
 
-    i dominates j where it is faster beyond the ranges and no worse, or no slower and better. Of several, the one that is best
-    on the front, by error and then by time.
+    i dominates j where it is better and not slower beyond the ranges, or as good and faster beyond them. Points that are
+    dominated dominate nothing, else a chain of ties would leave only the slowest. Of several, the fastest is named.
     """
-    count = len(timings)
-    by: list[list[int]] = [[] for _ in range(count)]
-    for j in range(count):
-        for i in range(count):
-            faster = timings[i].median < timings[j].median and not ties(timings[i], timings[j])
-            no_slower = faster or ties(timings[i], timings[j])
-            if (faster and errors[i] <= errors[j]) or (no_slower and errors[i] < errors[j]):
-                by[j].append(i)
-    found: list[int | None] = []
-    for j in range(count):
-        best = [i for i in by[j] if not by[i]] or by[j]
-        found.append(min(best, key=lambda i: (errors[i], timings[i].median)) if best else None)
+    found: list[int | None] = [None] * len(timings)
+    front: list[int] = []
+    for j in sorted(range(len(timings)), key=lambda j: (errors[j], timings[j].median)):
+        by = []
+        for i in front:
+            apart = not ties(timings[i], timings[j])
+            slower = apart and timings[i].median > timings[j].median
+            if not slower if errors[i] < errors[j] else apart and not slower:
+                by.append(i)
+        if by:
+            found[j] = min(by, key=lambda i: (timings[i].median, errors[i]))
+        else:
+            front.append(j)
     return found

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 Array = NDArray[Any]
 # Settings that are timed in turn, the exact one among them: a machine that slows down slows them all.
 TOGETHER = 8
-REPEAT = 9
+REPEAT = 15
 # The reference's picture where a film has several samples: the mean of as many squared.
 SUPERSAMPLES = 4
 
@@ -221,16 +221,17 @@ def timed(
 ) -> list[Timing]:
     """The exact scene's time, then the others', drawn in turn, `repeat` times.
 
-    A machine changes its pace from minute to minute: what is taken is the ratio to the exact scene's drawing in the same turn,
-    times the exact scene's time (`unit` [s], where that is known already).
+    A machine changes its pace from minute to minute: what is taken is the ratio to the median of the same turn, on a scale
+    where the exact scene takes what it takes (or `unit` [s], where that is known already). A median's range is 1.57 quartile
+    distances over the root of their number to either side (McGill, Tukey and Larsen 1978).
     """
     draws = [renderer.drawing(scene) for scene in (exact, *scenes)]
     seconds = np.array([[draw() for draw in draws] for _ in range(repeat)])
-    own = np.quantile(seconds[:, 0], (0.5, 0.25, 0.75))
-    unit = float(own[0]) if unit is None else unit
-    times = np.quantile(seconds / seconds[:, :1], (0.5, 0.25, 0.75), axis=0) * unit
-    times[:, 0] = own * (unit / own[0])
-    return [Timing(*map(float, column)) for column in times.T]
+    shares = seconds / np.median(seconds, axis=1, keepdims=True)
+    middle, low, high = np.quantile(shares, (0.5, 0.25, 0.75), axis=0)
+    scale = (float(np.median(seconds[:, 0])) if unit is None else unit) / middle[0]
+    reach = 1.57 * (high - low) / repeat**0.5
+    return [Timing(*map(float, t * scale)) for t in np.stack([middle, middle - reach, middle + reach], axis=1)]
 
 
 def _batches(items: list[Setting], size: int) -> Iterator[list[Setting]]:

@@ -176,6 +176,62 @@ class TestRender:
         assert "none.mtl" in result.err
 
 
+class TestSet:
+    """--set KEY=VALUE, wherever a scene is taken."""
+
+    def test_it_is_what_the_file_might_have_said(self, run: Any) -> None:
+        changes = ("film.size=[9,7]", "objects.0.material=gold", "materials.gold.roughness=0.4", "objects[0].shading=flat")
+        assert run("render", "s.toml", "-o", "x.png", *(word for text in changes for word in ("--set", text))).code == 0
+        Path("t.toml").write_text(
+            '[[objects]]\nshape = "sphere"\nshading = "flat"\nmaterial = { preset = "gold", roughness = 0.4 }\n[film]\nsize = [9, 7]\n'
+        )
+        assert run("render", "t.toml", "-o", "y.png").code == 0
+        assert run("render", "t.toml", "-o", "z.png", "--set", "objects.0.material.roughness=0.2").code == 0
+        assert np.array_equal(image.read("x.png")[0], image.read("y.png")[0])
+        assert not np.array_equal(image.read("x.png")[0], image.read("z.png")[0])
+
+    def test_the_last_one_holds_and_options_come_after(self, run: Any) -> None:
+        changes = ("--set", "film.size=[3,3]", "--set", "film={exposure=1}", "--set", "film.size=[5,4]")
+        assert run("render", "s.toml", "-o", "x.png", *changes).code == 0
+        assert image.read("x.png")[0].shape == (4, 5, 4)
+        assert run("render", "s.toml", "-o", "x.png", *changes, "--size", "6x2").code == 0
+        assert image.read("x.png")[0].shape == (2, 6, 4)
+
+    def test_a_mesh(self, run: Any) -> None:
+        Path("tri.v2.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        changes = ("--set", "film.size=[8,6]", "--set", 'objects."tri.v2".material=gold', "--set", "film.samples=1")
+        assert run("render", "tri.v2.obj", "-o", "x.png", *changes).code == 0
+        assert image.read("x.png")[0].shape == (6, 8, 4)
+
+    @pytest.mark.parametrize("command", ["render", "verify", "explain", "tradeoff"])
+    @pytest.mark.parametrize(
+        ("text", "code", "message"),
+        [
+            ("film", 2, "'--set': 'film' is not KEY=VALUE such as materials.body.roughness=0.3"),
+            ("film.size=[9", 2, "'--set': film.size: '[9' is not a value of TOML: Unclosed array"),
+            ("film.samples=3", 3, "s.toml: film.samples: 3 is not one of 1, 2, 4 or 8 (from --set)\n"),
+            ("flm.samples=4", 3, 's.toml: flm: unknown key; did you mean "film"? (from --set)\n'),
+            ("objects.0.shading.x=4", 3, "s.toml: objects[0].shading: "),
+            ("film.size.0.x=4", 3, "s.toml: --set film.size.0.x: film.size.0 is 24, not a table\n"),
+            ("objects.ball.shading=flat", 3, 's.toml: --set objects.ball: none is named "ball"; allowed: 0 to 0\n'),
+        ],
+    )
+    def test_what_cannot_be(self, command: str, text: str, code: int, message: str, run: Any, tmp_path: Path) -> None:
+        result = run(command, "s.toml", "--set", text)
+        assert (result.code, result.out) == (code, "")
+        assert message in result.err
+        assert code == 2 or result.err.count("\n") == 1
+        assert pictures(tmp_path) == []
+
+    def test_verify(self, run: Any) -> None:
+        result = run("verify", "s.toml", "--json", "--max-ambiguous", "100", "--set", "film.size=[8,6]")
+        assert result.code == 0
+        assert sum(json.loads(result.out)["classes"].values()) == 48
+        result = run("verify", "s.toml", "--size", "200000x3")
+        assert result.code == 2
+        assert "'--size': must be less than or equal to 131072, not 200000" in result.err
+
+
 class TestOthers:
     """The commands beside render."""
 

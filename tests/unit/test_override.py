@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import copy
+import json
+import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from glshade import SceneError, load
-from glshade.override import OverrideError, apply, parse
+from glshade import Scene, SceneError, load
+from glshade.override import LISTS, OverrideError, apply, pairs, parse, split
+from glshade.scene_file import SceneFile
 
 NAMES = st.text("abcxyz", min_size=1, max_size=3)
 LEAVES = st.integers() | st.booleans() | st.text("pq")
@@ -50,13 +54,89 @@ def test_what_is_set_is_there_and_nothing_else_has_changed(document: dict[str, A
     assert document == before
 
 
-@given(document=TABLES, one=NAMES, other=NAMES, values=st.tuples(st.integers(), st.integers()))
-def test_the_order_of_independent_keys_does_not_matter(
-    document: dict[str, Any], one: str, other: str, values: tuple[int, int]
-) -> None:
-    if one != other:
-        there = apply(apply(document, one, values[0]), other, values[1])
-        assert there == apply(apply(document, other, values[1]), one, values[0])
+# Names that a key has to put in quotes, and lists whose items have names, at any depth.
+ODD_NAMES = st.text("ax. =[]'é0", min_size=1, max_size=4)
+ITEMS = st.text("pqr.", min_size=1, max_size=2)
+
+
+def _nodes(inner: Any) -> Any:
+    named = st.dictionaries(ITEMS, st.dictionaries(ODD_NAMES, inner, max_size=3), max_size=3)
+    return (
+        st.dictionaries(ODD_NAMES, inner, max_size=4)
+        | st.lists(inner, max_size=3)
+        | named.map(lambda items: [{"name": name, **item} for name, item in items.items()])
+    )
+
+
+DOCUMENTS = st.dictionaries(ODD_NAMES, st.recursive(LEAVES, _nodes, max_leaves=12), min_size=1, max_size=4)
+Place = tuple[str | int, ...]
+
+
+def places(node: Any, before: Place = ()) -> Iterator[Place]:
+    """Of every value but the items' names, which are what keys go by."""
+    below = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+    for part, value in below:
+        if part != "name":
+            yield (*before, part)
+            yield from places(value, (*before, part))
+
+
+def at(document: Any, place: Place) -> Any:
+    for part in place:
+        document = document[part]
+    return document
+
+
+def within(place: Place, other: Place) -> bool:
+    return place[: len(other)] == other
+
+
+def written(document: Any, place: Place, by_name: bool) -> str:
+    """The key of a place."""
+    parts = []
+    for i, part in enumerate(place):
+        item = at(document, place[: i + 1])
+        name = item["name"] if by_name and isinstance(part, int) and isinstance(item, dict) and "name" in item else part
+        parts.append(str(name) if re.fullmatch(r"\w+", str(name)) else f'"{name}"')
+    return ".".join(parts)
+
+
+@given(document=DOCUMENTS, data=st.data(), value=st.integers(), by_name=st.booleans())
+def test_any_value_there_is_can_be_set(document: dict[str, Any], data: Any, value: int, by_name: bool) -> None:
+    before = copy.deepcopy(document)
+    place = data.draw(st.sampled_from(list(places(document))))
+    key = written(document, place, by_name)
+    after = apply(document, key, value)
+    assert at(after, place) == value
+    assert document == before
+    restored = apply(after, written(document, place, by_name=False), at(document, place))
+    assert restored == before, "nothing else has changed"
+    assert apply(apply(document, key, "x"), key, value) == after or isinstance(place[-1], int), "the last one holds"
+
+
+@given(document=DOCUMENTS, data=st.data(), by_name=st.booleans())
+def test_the_order_of_independent_keys_does_not_matter(document: dict[str, Any], data: Any, by_name: bool) -> None:
+    there = st.sampled_from(list(places(document)))
+    one, other = data.draw(there), data.draw(there)
+    assume(not within(one, other) and not within(other, one))
+    # An item that is no table any more has no name to go by.
+    by_name = by_name and not isinstance(one[-1], int) and not isinstance(other[-1], int)
+    first, second = written(document, one, by_name), written(document, other, by_name)
+    result = apply(apply(document, first, 1), second, 2)
+    assert result == apply(apply(document, second, 2), first, 1)
+    assert (at(result, one), at(result, other)) == (1, 2)
+
+
+@pytest.mark.parametrize("key", ["objects[1].kd", "objects.1.kd", "objects.b.kd", "'objects' . \"b\".kd", "objects [1].kd"])
+def test_ways_to_write_one_key(key: str) -> None:
+    document = {"objects": [{"name": "a"}, {"name": "b", "kd": 1}]}
+    assert apply(document, key, 2) == {"objects": [{"name": "a"}, {"name": "b", "kd": 2}]}
+
+
+@pytest.mark.parametrize("key", ["", ".", "a.", ".a", "a..b", 'a."b', "a[x]", "a[-1]", "[0]", "a=b", "a b.'c'd"])
+def test_what_is_no_key(key: str) -> None:
+    with pytest.raises(OverrideError, match="is not a dotted key"):
+        apply({}, key, 1)
 
 
 @pytest.mark.parametrize(
@@ -64,22 +144,34 @@ def test_the_order_of_independent_keys_does_not_matter(
     [
         ("a.b=0.3", 0.3),
         ("a.b = [640, 360]", [640, 360]),
+        ("a.b=[640,\n360]", [640, 360]),
         ("a.b=gold", "gold"),
         ("a.b='x y'", "x y"),
+        ("a.b='true'", "true"),
         ("a.b=true", True),
         ("a.b={type='cube'}", {"type": "cube"}),
         ("a.b=1e-3", 1e-3),
         ("a.b=1/r^2", "1/r^2"),
+        ("a.b=c=d", "c=d"),
     ],
 )
 def test_values_are_toml_or_words(text: str, value: Any) -> None:
-    assert parse(text) == ("a.b", value)
+    key, word = split(text)
+    assert (key, parse(word)) == ("a.b", value)
+    assert pairs([split(text)]) == [("a.b", value)]
 
 
-@pytest.mark.parametrize("text", ["a", "=3", "a=", "a..b=1", "a=[1,", 'a="x'])
+@given(value=st.integers() | st.booleans() | st.floats(allow_nan=False, allow_infinity=False) | st.text("ab \"\\é=#'"))
+def test_a_value_is_what_its_text_says(value: Any) -> None:
+    assert parse(json.dumps(value, ensure_ascii=False)) == value
+    assert parse(json.dumps([value, value], ensure_ascii=False)) == [value, value]
+
+
+@pytest.mark.parametrize("text", ["a", "=3", "a=", "a..b=1", "a=[1,", 'a="x', "a=3\nb=4", "a[x]=1", "a=" + "[" * 9999])
 def test_what_is_no_assignment(text: str) -> None:
-    with pytest.raises(ValueError, match="is not"):
-        parse(text)
+    with pytest.raises(ValueError, match="is not") as caught:
+        split(text)
+    assert len(str(caught.value)) < 200
 
 
 SCENE = """
@@ -130,10 +222,16 @@ def test_a_scene_is_changed_before_it_is_checked(file: Path) -> None:
         ("materials.bdy.kd", 1, 'materials.bdy: no material or preset is named "bdy"; did you mean "body"?'),
         ("objects.bal.shading", "flat", 'objects.bal: none is named "bal"; did you mean "ball"?'),
         ("objects.7.shading", "flat", "there are 2"),
+        ("objects." + "9" * 5000 + ".shading", "flat", "there are 2"),
+        ("objects.².shading", "flat", 'none is named "²"; allowed: 0 to 1, ball'),
+        ("lights.rim.intensity", 2, 'lights.rim: none is named "rim"; allowed: 0 to 0, key'),
+        ("animation.turn.values", [], "the scene lists no animation"),
+        ("film.size", 3, "film.size: must be a list, not 3 (from --set)"),
+        ("quality.fresnel", "schlik", "'schlik' is not one of 'exact' or 'schlick' (from --set)"),
+        ("materials", {}, 'objects[1].material: no material or preset is named "body"'),
         ("objects.1.material.kd", 1, "set materials.body.kd in its place"),
         ("materials.body.kd.texture", "x.png", "materials.body.kd is 0.5, not a table"),
         ("quality.fresnl", "exact", 'did you mean "fresnel"?'),
-        ("film.size", 3, "film.size"),
     ],
 )
 def test_a_key_that_leads_nowhere(file: Path, key: str, value: Any, fault: str) -> None:
@@ -141,6 +239,78 @@ def test_a_key_that_leads_nowhere(file: Path, key: str, value: Any, fault: str) 
         load(file, {key: value})
     assert fault in str(caught.value)
     assert str(file) in str(caught.value)
+
+
+def test_faults_of_the_file_and_faults_from_set(tmp_path: Path) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text(SCENE + "[film]\nsamples = 3\n[cameras.top]\nfov = 30\n")
+    own = f"{path}: film.samples: 3 is not one of 1, 2, 4 or 8"
+    for camera in (None, "top"):
+        with pytest.raises(SceneError) as caught:
+            SceneFile(path, {"materials.body.exponent": -1}).scene(None, camera)
+        assert caught.value.problems == (own, f"{path}: materials.body.exponent: must be at least 0, not -1 (from --set)")
+    with pytest.raises(SceneError) as caught:
+        load(path)
+    assert caught.value.problems == (own,)
+    assert load(path, {"film.samples": 2}).film.samples == 2
+
+
+def test_a_fault_of_a_file_that_was_set(file: Path) -> None:
+    (file.parent / "empty.obj").write_text("")
+    with pytest.raises(SceneError, match=r"objects\[0\]\.mesh: .*empty\.obj.* \(from --set\)"):
+        load(file, {"objects.0": {"mesh": "empty.obj"}})
+
+
+def test_every_key_that_leads_nowhere_is_told(file: Path) -> None:
+    with pytest.raises(SceneError) as caught:
+        load(file, {"objects.bal.shading": "flat", "film.samples": 4, "materials.bdy.kd": 1})
+    assert [problem.split(": ")[1] for problem in caught.value.problems] == ["--set objects.bal", "--set materials.bdy"]
+
+
+def test_pairs_are_texts_in_their_order(file: Path) -> None:
+    """A key may come more than once, and a string is what it says on a command line."""
+    scene = load(file, [("film.samples", "4"), ("film", "{ size = [8, 9] }"), ("film.size.0", "7"), ("description", "'4'")])
+    assert (scene.film.samples, scene.film.size, scene.description) == (1, (7, 9), "4")
+    assert load(file, [("film.size", (8, 9))]).film.size == (8, 9)
+    assert load(file, {"description": "4"}).description == "4", "in a mapping the value itself"
+    with pytest.raises(SceneError, match=r"s\.toml: --set film\.size: '\[8' is not a value of TOML"):
+        load(file, [("film.size", "[8")])
+
+
+@pytest.mark.parametrize("text", ['"a"', "[1]", '[{"name": "film"}]', "null", "3"])
+def test_a_file_that_is_no_table(text: str, tmp_path: Path) -> None:
+    (tmp_path / "s.json").write_text(text)
+    with pytest.raises(SceneError, match=r"s\.json: must be a table"):
+        load(tmp_path / "s.json", {"film.samples": 4})
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "fault"),
+    [
+        (
+            '{"objects": [{"name": 1, "shape": "cube"}, {"name": "a", "shape": "cube"}]}',
+            "objects.b.shading",
+            "allowed: 0 to 1, a",
+        ),
+        ('{"objects": []}', "objects.b.shading", "objects.b: there are none, objects is empty"),
+        ('{"objects": [{"shape": "cube"}]}', "lights.key.intensity", "lights.key: the scene lists no lights"),
+        ('{"objects": [{"shape": "cube"}], "lights": null}', "lights.0.intensity", "lights.0: the scene lists no lights"),
+        ('{"objects": [{"material": "v1.2"}]}', "objects.0.material.kd", 'set materials."v1.2".kd in its place'),
+    ],
+)
+def test_lists_without_such_an_item(text: str, key: str, fault: str, tmp_path: Path) -> None:
+    (tmp_path / "s.json").write_text(text)
+    with pytest.raises(SceneError) as caught:
+        load(tmp_path / "s.json", {key: 1})
+    (problem,) = caught.value.problems
+    assert problem.endswith(fault)
+
+
+def test_the_lists_are_the_scenes() -> None:
+    def is_list(schema: dict[str, Any]) -> bool:
+        return schema.get("type") == "array" or any(map(is_list, schema.get("anyOf", ())))
+
+    assert {name for name, schema in Scene.model_json_schema()["properties"].items() if is_list(schema)} == LISTS
 
 
 def test_a_mesh_file_is_a_document_too(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ import glshade
 PUBLIC = [
     *("AssetError", "BRDFS", "ContextError", "Film", "GlshadeError", "Image", "LIGHTS", "Mesh", "NormalMap", "Object"),
     *("Orthographic", "Perspective", "Plan", "Renderer", "Scene", "SceneError", "ShaderError", "Texture", "Transform"),
-    *("compare", "evaluate", "explain", "load", "reference", "render", "verify", "Verdict"),
+    *("compare", "evaluate", "explain", "from_pyrender", "load", "reference", "render", "verify", "Verdict"),
 ]
 
 

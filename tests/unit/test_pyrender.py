@@ -497,4 +497,4 @@ def test_colours_are_nearly_pyrenders(both: tuple[Any, Any]) -> None:
     lit = difference[~background.all(axis=2)]
     # Its G has another k, 0.96 dims its diffuse part, and 0.001 its highlights: see docs/pyrender.md.
     assert np.median(lit) <= 6
-    assert np.percentile(lit, 95) <= 12
+    assert np.percentile(lit, 95) <= 16

@@ -35,7 +35,11 @@ def fault(**keys: Any) -> tuple[str, str]:
 @pytest.mark.parametrize(
     ("keys", "path", "message"),
     [
-        ({"colour": 3}, "colour", "unknown key; allowed: animation, camera, cameras, description, film, lights, materials, objects, quality"),
+        (
+            {"colour": 3},
+            "colour",
+            "unknown key; allowed: animation, camera, cameras, description, film, lights, materials, objects, quality",
+        ),
         ({"light": []}, "light", 'unknown key; did you mean "lights"?'),
         ({"film": {"sizes": [1, 1]}}, "film.sizes", 'unknown key; did you mean "size"?'),
         ({"film": {"size": [0, 10]}}, "film.size.0", "must be greater than or equal to 1, not 0"),
