@@ -31,6 +31,24 @@ class Size(click.ParamType[tuple[int, int]]):
         return int(match[1]), int(match[2])
 
 
+class Duration(click.ParamType[float]):
+    """`5ms`, `0.2s`; a bare number is in milliseconds. Gives seconds."""
+
+    name = "TIME"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        if isinstance(value, float):
+            return value
+        match = re.fullmatch(r"([0-9.]+(?:e-?\d+)?)\s*(ms|s|)", value)
+        try:
+            seconds = float(match[1]) * (1.0 if match[2] == "s" else 1e-3) if match else 0.0
+        except ValueError:
+            seconds = 0.0
+        if not seconds > 0:
+            self.fail(f"{value!r} is not a time such as 5ms or 0.2s", param, ctx)
+        return seconds
+
+
 def overrides(command: Any) -> Any:
     """The option --set, which gives `overrides`: (key, text), as `glshade.load` takes them."""
     return click.option(
@@ -87,7 +105,7 @@ def _assignments(texts: tuple[str, ...], option: click.Parameter) -> list[tuple[
     metavar="METRIC=LIMIT",
     help="Draws with the cheapest settings whose error stays within it: max_abs=2e-3, rmse=, p999=, codes=, flip=.",
 )
-@click.option("--deadline", type=click.FloatRange(min=0, min_open=True), help="Draws as exactly as can be in a time [ms].")
+@click.option("--deadline", type=Duration(), help="Draws as exactly as can be in a time: 5ms.")
 @click.option("--backend", type=click.Choice(["auto", "egl", "osmesa", "standalone"]), default="auto", show_default=True)
 @click.option("--device", type=int, help="EGL device, as `glshade devices` counts them.")
 def command(
@@ -209,7 +227,7 @@ def _chosen(scene: Scene, renderer: Renderer, limits: dict[str, float], deadline
     """The settings that are good enough, or quick enough, and a word on stderr."""
     from glshade.tradeoff.budget import choose, within_deadline
 
-    choice = choose(scene, renderer, limits) if deadline is None else within_deadline(scene, renderer, deadline / 1e3)
+    choice = choose(scene, renderer, limits) if deadline is None else within_deadline(scene, renderer, deadline)
     for line in choice.says(scene).splitlines():
         click.echo(line, err=True)
     return choice

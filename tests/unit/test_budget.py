@@ -7,10 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from click.testing import CliRunner
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glshade import Renderer, Scene, reference
+from glshade.cli import cli
+from glshade.cli.render import Duration
 from glshade.tradeoff import budget
 from glshade.tradeoff.budget import BudgetError, Choice, applied, choose, parse, within_deadline
 from glshade.tradeoff.metrics import METRICS, errors
@@ -132,3 +135,26 @@ def test_what_a_budget_is_not(text: str, fault: str) -> None:
 @given(limits=st.dictionaries(st.sampled_from(METRICS), st.floats(1e-9, 1e3), min_size=1))
 def test_a_budget_is_read_as_written(limits: dict[str, float]) -> None:
     assert parse([f"{metric}={limit!r}" for metric, limit in limits.items()]) == limits
+
+
+@pytest.mark.parametrize(("text", "seconds"), [("5ms", 5e-3), ("5", 5e-3), ("0.2s", 0.2), ("1e-1 ms", 1e-4)])
+def test_a_time_is_read_as_written(text: str, seconds: float) -> None:
+    assert Duration().convert(text, None, None) == pytest.approx(seconds)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "fault"),
+    [
+        (("--deadline", "0ms"), "'0ms' is not a time such as 5ms"),
+        (("--deadline", "soon"), "'soon' is not a time"),
+        (("--deadline", "1s", "--shading", "flat"), "choose the settings"),
+        (("--budget", "max=1"), "metrics: max_abs"),
+        (("--budget", "rmse=1", "--deadline", "1s"), "choose the settings"),
+    ],
+)
+def test_what_the_command_refuses(arguments: tuple[str, ...], fault: str, tmp_path: Path) -> None:
+    path = tmp_path / "s.toml"
+    path.write_text('objects = [{ shape = "cube" }]\n')
+    result = CliRunner().invoke(cli, ["render", str(path), *arguments])
+    assert result.exit_code == 2
+    assert fault in result.output
