@@ -25,7 +25,7 @@ from glshade.cli.render import overrides
 def command(
     scene: Path,
     shading: Any,
-    overrides: dict[str, Any],
+    overrides: list[tuple[str, str]],
     source: bool,
     active: bool,
     census: bool,

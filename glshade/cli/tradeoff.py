@@ -46,7 +46,7 @@ def command(
     metric: str,
     repeat: int | None,
     size: tuple[int, int] | None,
-    overrides: dict[str, Any],
+    overrides: list[tuple[str, str]],
     again: bool,
     backend: Any,
     device: int | None,

@@ -183,7 +183,8 @@ class TestSet:
         changes = ("film.size=[9,7]", "objects.0.material=gold", "materials.gold.roughness=0.4", "objects[0].shading=flat")
         assert run("render", "s.toml", "-o", "x.png", *(word for text in changes for word in ("--set", text))).code == 0
         Path("t.toml").write_text(
-            '[[objects]]\nshape = "sphere"\nshading = "flat"\nmaterial = { preset = "gold", roughness = 0.4 }\n[film]\nsize = [9, 7]\n'
+            '[[objects]]\nshape = "sphere"\nshading = "flat"\nmaterial = { preset = "gold", roughness = 0.4 }\n'
+            "[film]\nsize = [9, 7]\n"
         )
         assert run("render", "t.toml", "-o", "y.png").code == 0
         assert run("render", "t.toml", "-o", "z.png", "--set", "objects.0.material.roughness=0.2").code == 0
@@ -226,7 +227,7 @@ class TestSet:
     def test_verify(self, run: Any) -> None:
         result = run("verify", "s.toml", "--json", "--max-ambiguous", "100", "--set", "film.size=[8,6]")
         assert result.code == 0
-        assert sum(json.loads(result.out)["classes"].values()) == 48
+        assert sum(json.loads(result.out)["counts"].values()) == 48
         result = run("verify", "s.toml", "--size", "200000x3")
         assert result.code == 2
         assert "'--size': must be less than or equal to 131072, not 200000" in result.err
