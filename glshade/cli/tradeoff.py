@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from glshade.cli.render import Size, overrides
+from glshade.cli.render import Size, filmed, overrides
 
 if TYPE_CHECKING:
     from glshade.tradeoff.study import Study
@@ -63,9 +63,7 @@ def command(
     from glshade.tradeoff.study import REPEAT
 
     wanted = _knobs(knobs)
-    loaded = load(scene, overrides)
-    if size is not None:
-        loaded = loaded.model_copy(update={"film": loaded.film.model_copy(update={"size": size})})
+    loaded = filmed(load(scene, overrides), {"size": size})
     folder = output or Path(f"tradeoff-{scene.stem.removeprefix('tradeoff-')}")
     try:
         folder.mkdir(parents=True, exist_ok=True)
