@@ -1,8 +1,7 @@
-"""Image: an array with channels and a colour space; files through OpenImageIO."""
+"""Image: an array with channels and a colour space."""
 
 from __future__ import annotations
 
-import os
 import warnings
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,27 +10,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.errors import AssetError, GlshadeError
+from glshade.picture_file import FLOAT_SUFFIXES, check_suffix, write
+from glshade.srgb import linear_to_srgb, srgb_to_linear
 
 Encoding = Literal["linear", "srgb"]
-FLOAT_SUFFIXES = frozenset({".exr", ".hdr"})
-BYTE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff"})
-SUFFIXES = FLOAT_SUFFIXES | BYTE_SUFFIXES
-# Of 9: level 6 takes three times as long for files two thirds the size.
-PNG_LEVEL = 1
-JPEG_QUALITY = 95
-
-
-def linear_to_srgb(c: NDArray[Any]) -> NDArray[np.float32]:
-    """Linear [0, 1] to sRGB-encoded [0, 1], any shape; what is outside is clipped. IEC 61966-2-1."""
-    c = np.clip(np.asarray(c, dtype=np.float32), 0.0, 1.0)
-    return np.where(c > 0.0031308, 1.055 * np.maximum(c, 0.0031308) ** (1 / 2.4) - 0.055, 12.92 * c).astype(np.float32)
-
-
-def srgb_to_linear(c: NDArray[Any]) -> NDArray[np.float32]:
-    """sRGB-encoded [0, 1] to linear, any shape. IEC 61966-2-1."""
-    c = np.asarray(c, dtype=np.float32)
-    return np.where(c > 0.04045, ((np.maximum(c, 0.04045) + 0.055) / 1.055) ** 2.4, c / 12.92).astype(np.float32)
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +21,7 @@ class Image:
     """A picture, row 0 at the top.
 
     pixels (H, W, 3 or 4): float32 and linear Rec. 709 with premultiplied alpha, or uint8, sRGB-encoded or linear as
-    `encoding` says, with straight alpha. attributes: what EXR files carry beside the pixels.
+    `encoding` says, with straight alpha. attributes: what files say of themselves beside the pixels; HDR says nothing.
     """
 
     pixels: NDArray[Any]
@@ -107,7 +89,7 @@ class Image:
             image = self.linear()
         else:
             image = self.encoded()
-        _write(path, image)
+        write(path, image.pixels, linear=image.encoding == "linear", attributes=image.attributes)
 
     def _repr_png_(self) -> bytes:
         import tempfile
@@ -116,98 +98,3 @@ class Image:
             path = Path(folder) / "image.png"
             self.save(path)
             return path.read_bytes()
-
-
-def check_suffix(path: Path) -> None:
-    """Errors: GlshadeError where the extension names no format that is written here."""
-    if path.suffix.lower() not in SUFFIXES:
-        raise GlshadeError(
-            f"{path}: cannot write {path.suffix or 'a file without extension'}; allowed: {', '.join(sorted(SUFFIXES))}"
-        )
-
-
-def _write(path: Path, image: Image) -> None:
-    import OpenImageIO as oiio
-
-    pixels = image.pixels
-    if path.suffix.lower() in {".jpg", ".jpeg", ".hdr"}:
-        pixels = pixels[..., :3]
-    height, width, channels = pixels.shape
-    spec = oiio.ImageSpec(width, height, channels, "float" if pixels.dtype == np.float32 else "uint8")
-    # sRGB is what everybody takes an 8-bit file for, and saying so would load a colour configuration for 20 ms.
-    if image.encoding == "linear":
-        spec.attribute("oiio:ColorSpace", "lin_rec709")
-    if pixels.dtype == np.uint8 and channels == 4:
-        spec.attribute("oiio:UnassociatedAlpha", 1)
-    spec.attribute("png:compressionLevel", PNG_LEVEL)
-    spec.attribute("Compression", f"jpeg:{JPEG_QUALITY}" if path.suffix.lower() in {".jpg", ".jpeg"} else "zip")
-    # No time of day inside: the same picture is the same bytes.
-    spec.attribute("Software", "glshade")
-    for name, value in image.attributes.items():
-        spec.attribute(name, value)
-    if not path.parent.is_dir():
-        raise GlshadeError(f"{path}: the folder {path.parent} does not exist; make it first")
-    beside = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
-    try:
-        output = oiio.ImageOutput.create(str(beside))
-        if output is None:
-            raise GlshadeError(f"{path}: cannot be written: {_one_line(oiio.geterror())}")
-        written = output.open(str(beside), spec) and output.write_image(np.ascontiguousarray(pixels))
-        # A full disk may show in the message alone: what was buffered is written when the file is closed. (TIFF's message
-        # may be of an Exif table that it could not make, which is no loss.)
-        closed = output.close()
-        message = _one_line(output.geterror())
-        if not (closed and written) or (message and "Exif" not in message):
-            raise GlshadeError(f"{path}: cannot be written: {message or _one_line(oiio.geterror())}")
-        os.replace(beside, path)
-    except OSError as error:
-        raise GlshadeError(f"{path}: cannot be written: {error.strerror}") from None
-    finally:
-        beside.unlink(missing_ok=True)
-
-
-def _one_line(message: str) -> str:
-    return "; ".join(line.strip() for line in message.splitlines() if line.strip())
-
-
-def probe(path: str | Path) -> None:
-    """Whether a file can be read as a picture, by its header. Errors: AssetError."""
-    import OpenImageIO as oiio
-
-    source = oiio.ImageInput.open(str(path))
-    if source is None:
-        raise AssetError(f"{path}: cannot be read as a picture: {oiio.geterror().strip()}")
-    source.close()
-
-
-def read(path: str | Path, encoding: Literal["auto", "srgb", "linear"] = "auto") -> tuple[NDArray[np.float32], bool]:
-    """((H, W, C) float32, linear Rec. 709 with straight alpha; whether it has alpha).
-
-    auto: 8-bit and 16-bit integers are taken as sRGB-encoded, floats as linear. Errors: AssetError.
-    """
-    import OpenImageIO as oiio
-
-    config = oiio.ImageSpec()
-    config.attribute("oiio:UnassociatedAlpha", 1)
-    source = oiio.ImageInput.open(str(path), config)
-    if source is None:
-        raise AssetError(f"{path}: cannot be read as a picture: {_one_line(oiio.geterror())}")
-    spec = source.spec()
-    pixels = source.read_image(oiio.FLOAT)
-    message = _one_line(source.geterror())
-    source.close()
-    if pixels is None or message:
-        raise AssetError(f"{path}: cannot be read as a picture: {message or 'no pixels'}")
-    pixels = np.asarray(pixels, dtype=np.float32).reshape(spec.height, spec.width, spec.nchannels)
-    has_alpha = spec.nchannels in (2, 4)
-    colour = pixels[..., : spec.nchannels - has_alpha]
-    floats = str(spec.format) in {"float", "half", "double"}
-    if encoding == "srgb" or (encoding == "auto" and not floats):
-        colour = srgb_to_linear(colour)
-    if colour.shape[2] < 3:
-        colour = np.repeat(colour[..., :1], 3, axis=2)
-    alpha = pixels[..., -1:] if has_alpha else np.ones_like(colour[..., :1])
-    if has_alpha and not spec.get_int_attribute("oiio:UnassociatedAlpha"):
-        # OpenEXR's colours are premultiplied.
-        colour = np.divide(colour, alpha, out=colour.copy(), where=alpha > 0)
-    return np.concatenate([colour[..., :3], alpha], axis=2), has_alpha

@@ -106,7 +106,7 @@ def swatch(material: Brdf) -> str:
     import numpy as np
 
     from glshade.albedo import albedo
-    from glshade.image import linear_to_srgb
+    from glshade.srgb import linear_to_srgb
 
     # Half a code of eight bits.
     colour = linear_to_srgb(albedo(material, (0.0, 0.0, 1.0), within=2e-3))

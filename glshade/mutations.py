@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.gl.renderer import Renderer
-from glshade.image import linear_to_srgb
 from glshade.scene import Rate, Scene
 from glshade.source import Source, Stage
+from glshade.srgb import linear_to_srgb
 from glshade.verifier import Candidates, Verdict, candidates, single_sample, verdict_of
 
 Array = NDArray[Any]

@@ -14,12 +14,12 @@ from glshade.brdfs import BRDFS, Brdf
 from glshade.camera import CAMERAS, Camera, Matrix4, Perspective, affine
 from glshade.document import Chosen, Document, File, Finite, Triple, Vector3, fault, nearest, number
 from glshade.errors import AssetError
-from glshade.image import srgb_to_linear
 from glshade.lights import LIGHTS, Light
 from glshade.mesh import Mesh
 from glshade.presets import PRESETS, FromPreset, preset
 from glshade.quality import Quality
 from glshade.shape import SHAPES, Shape
+from glshade.srgb import srgb_to_linear
 
 Array = NDArray[np.float64]
 Rate = Literal["flat", "gouraud", "phong"]

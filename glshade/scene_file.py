@@ -14,7 +14,7 @@ from pydantic import ValidationError
 from glshade import mesh_file
 from glshade.document import Document, nearest
 from glshade.errors import AssetError, SceneError
-from glshade.image import probe
+from glshade.picture_file import probe
 from glshade.scene import Scene
 from glshade.texture import Picture
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade import image
+from glshade import picture_file
 from glshade.texture import BumpMap, Encoding, Picture, Texture, WrapMode
 
 Pixels = NDArray[np.float32]
@@ -44,7 +44,7 @@ class Texels:
 
     def read(self) -> Pixels:
         """(H, W, 4) float32, straight alpha, row 0 at the bottom, where GL has it. Errors: AssetError."""
-        pixels = np.ascontiguousarray(image.read(self.path, self.encoding)[0][::-1])
+        pixels = np.ascontiguousarray(picture_file.read(self.path, self.encoding)[0][::-1])
         return normals(pixels[..., 0], self.given) if self.heights else pixels
 
 

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from glshade import reference
 from glshade.comparison import Comparison, Expected, PixelClass, classify, judge
-from glshade.image import Image, linear_to_srgb
+from glshade.image import Image
 from glshade.reference import LLVMPIPE, MARGIN, Bounds, Driver, Fragments, Inputs
 from glshade.scene import Rate, Scene
+from glshade.srgb import linear_to_srgb
 
 Array = NDArray[Any]
 Flags = NDArray[np.bool_]

@@ -122,7 +122,7 @@ def command(
         name = re.sub(r"[^\w.=-]+", "-", "-".join(Path(text).name for text in materials))
         output = Path(name[:80] + (".png" if bare else ".svg"))
     if bare:
-        from glshade.image import check_suffix
+        from glshade.picture_file import check_suffix
 
         check_suffix(output)
     else:

@@ -131,7 +131,7 @@ def command(
     Several frames, cameras or scenes are a batch: it refuses to begin where one of its pictures is there already, unless told
     to --overwrite or to --skip-existing.
     """
-    from glshade.image import FLOAT_SUFFIXES, check_suffix
+    from glshade.picture_file import FLOAT_SUFFIXES, check_suffix
     from glshade.scene_file import SceneFile
 
     if output is not None:

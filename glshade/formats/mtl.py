@@ -85,12 +85,12 @@ BLUER = 0.2
 
 def _holds_normals(file: File, texture: str) -> bool:
     """Whether a bump map has normals in place of heights, as many programs write it."""
-    from glshade import image
+    from glshade import picture_file
 
     # What is read here depends on the picture's content, not on its presence alone.
     file.read(Path(texture))
     try:
-        pixels, _ = image.read(texture, "linear")
+        pixels, _ = picture_file.read(texture, "linear")
     except AssetError:
         return False  # which is said when it is drawn
     return float((pixels[..., 2] - pixels[..., 0]).mean()) > BLUER

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 
 from glshade.errors import ContextError
 from glshade.gl.context import Context
-from glshade.image import linear_to_srgb
 from glshade.source import PAGE
+from glshade.srgb import linear_to_srgb
 
 Array = NDArray[np.float64]
 Float32 = NDArray[np.float32]

@@ -470,7 +470,7 @@ def _sample_passes(samples: int, available: int) -> list[tuple[float, float]]:
 
 def _background(colour: tuple[float, ...], encoding: Literal["linear", "srgb"]) -> tuple[float, float, float, float]:
     """Four numbers, premultiplied, encoded as the frame is."""
-    from glshade.image import linear_to_srgb
+    from glshade.srgb import linear_to_srgb
 
     alpha = colour[3] if len(colour) == 4 else 1.0
     rgb = [c * alpha for c in colour[:3]]

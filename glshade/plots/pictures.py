@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 from glshade import lobe
 from glshade.brdfs import Brdf
 from glshade.camera import Orthographic
-from glshade.image import Image, linear_to_srgb
+from glshade.image import Image
 from glshade.mesh import Mesh
 from glshade.scene import Film, Object, Scene, Transform
+from glshade.srgb import linear_to_srgb
 
 Array = NDArray[np.float64]
 Scale = Literal["linear", "log"]

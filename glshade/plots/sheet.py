@@ -432,6 +432,6 @@ def _linear(colour: str) -> Array:
     """Linear Rec. 709 of a colour as matplotlib names it."""
     from matplotlib.colors import to_rgb
 
-    from glshade.image import srgb_to_linear
+    from glshade.srgb import srgb_to_linear
 
     return srgb_to_linear(np.array(to_rgb(colour))).astype(np.float64)

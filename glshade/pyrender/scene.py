@@ -19,13 +19,13 @@ from glshade.camera import Perspective, is_singular
 from glshade.errors import SceneError
 from glshade.formats import gltf_material
 from glshade.formats.file import File
-from glshade.image import srgb_to_linear
 from glshade.lights import LIGHTS, Light
 from glshade.mesh import Mesh
 from glshade.mesh_file import AssetWarning
 from glshade.pyrender.camera import affine_rows, camera
 from glshade.pyrender.textures import picture, rgba
 from glshade.scene import Film, Object, Scene, Transform
+from glshade.srgb import srgb_to_linear
 
 Array = NDArray[np.float64]
 

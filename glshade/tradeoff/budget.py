@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from glshade import __version__, reference
 from glshade.digest import digest
 from glshade.errors import GlshadeError
-from glshade.image import linear_to_srgb
 from glshade.quality import Quality
 from glshade.scene import Object, Scene
+from glshade.srgb import linear_to_srgb
 from glshade.tradeoff.front import Timing
 from glshade.tradeoff.metrics import METRICS, Errors, errors, largest
 from glshade.tradeoff.setting import EXACT, Setting, space

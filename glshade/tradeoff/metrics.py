@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.image import linear_to_srgb
+from glshade.srgb import linear_to_srgb
 
 Array = NDArray[Any]
 # Of a 0.7 m wide screen of 3840 pixels seen from 0.7 m: the default of FLIP's authors.

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glshade import BRDFS, image
+from glshade import BRDFS, picture_file
 from glshade.bench.brdfs import Cost, Costs
 from glshade.gl.census import KINDS, Operations
 from glshade.gl.clock import Spread
@@ -137,7 +137,7 @@ class TestPictures:
 
     @pytest.mark.parametrize("name", list(BRDFS))
     def test_four_spheres_and_their_lobes(self, name: str) -> None:
-        pixels = image.read(book.PICTURES / f"{name}.png")[0][..., :3]
+        pixels = picture_file.read(book.PICTURES / f"{name}.png")[0][..., :3]
         side = book.SIDE
         assert pixels.shape == (side + side * 3 // 4, 4 * side, 3)
         # A sphere stands before white, and no two materials look alike.

@@ -14,7 +14,7 @@ import OpenImageIO as oiio
 import pytest
 
 import glshade
-from glshade import image
+from glshade import picture_file
 
 SCENE = '[[objects]]\nshape = "sphere"\n[film]\nsize = [24, 16]\n'
 BROKEN_DRIVER = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent"}
@@ -59,24 +59,24 @@ class TestRender:
     def test_writes_the_picture_and_says_where(self, run: Any, tmp_path: Path) -> None:
         assert run("render", "s.toml", "-o", "x.png") == Result(0, "x.png\n", "")
         assert pictures(tmp_path) == ["x.png"]
-        assert image.read("x.png")[0].shape == (16, 24, 4)
+        assert picture_file.read("x.png")[0].shape == (16, 24, 4)
 
     def test_the_name_is_the_scenes(self, run: Any, tmp_path: Path) -> None:
         assert run("render", "s.toml") == Result(0, "s.png\n", "")
         assert pictures(tmp_path) == ["s.png"]
 
-    @pytest.mark.parametrize("suffix", sorted(image.SUFFIXES))
+    @pytest.mark.parametrize("suffix", sorted(picture_file.SUFFIXES))
     def test_every_format(self, suffix: str, run: Any) -> None:
         assert run("render", "s.toml", "-o", f"x{suffix}").code == 0
         reference = glshade.render(glshade.load("s.toml"), dtype="float32").pixels
         # 8 bits are half a code off, at the bright end of the sRGB curve 0.0045; JPEG is lossy, and HDR has 8 bits of mantissa.
         tolerance = {".exr": 0, ".hdr": 5e-3, ".jpg": 0.1, ".jpeg": 0.1}.get(suffix, 4.6e-3)
-        assert np.abs(image.read(f"x{suffix}")[0][..., :3] - reference).max() <= tolerance
+        assert np.abs(picture_file.read(f"x{suffix}")[0][..., :3] - reference).max() <= tolerance
 
     def test_options_override_the_film(self, run: Any) -> None:
         assert run("render", "s.toml", "-o", "x.exr", "--size", "9x7", "--exposure", "1", "--samples", "4").code == 0
         assert run("render", "s.toml", "-o", "y.exr", "--size", "9x7", "--samples", "4").code == 0
-        twice, once = (image.read(name)[0] for name in ("x.exr", "y.exr"))
+        twice, once = (picture_file.read(name)[0] for name in ("x.exr", "y.exr"))
         assert twice.shape == (7, 9, 4)
         assert twice[..., :3] == pytest.approx(2 * once[..., :3], rel=1e-6)
 
@@ -158,7 +158,7 @@ class TestRender:
         assert pictures(tmp_path) == ["t.png"]
 
     def test_a_mesh_without_texture_coordinates(self, run: Any) -> None:
-        image.Image(np.zeros((2, 2, 3), dtype=np.uint8)).save("t.png")
+        glshade.Image(np.zeros((2, 2, 3), dtype=np.uint8)).save("t.png")
         Path("tri.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
         Path("s.toml").write_text(
             '[[objects]]\nmesh = "tri.obj"\nmaterial = { brdf = "lambert", kd = { texture = "t.png" } }\n'
@@ -188,21 +188,21 @@ class TestSet:
         )
         assert run("render", "t.toml", "-o", "y.png").code == 0
         assert run("render", "t.toml", "-o", "z.png", "--set", "objects.0.material.roughness=0.2").code == 0
-        assert np.array_equal(image.read("x.png")[0], image.read("y.png")[0])
-        assert not np.array_equal(image.read("x.png")[0], image.read("z.png")[0])
+        assert np.array_equal(picture_file.read("x.png")[0], picture_file.read("y.png")[0])
+        assert not np.array_equal(picture_file.read("x.png")[0], picture_file.read("z.png")[0])
 
     def test_the_last_one_holds_and_options_come_after(self, run: Any) -> None:
         changes = ("--set", "film.size=[3,3]", "--set", "film={exposure=1}", "--set", "film.size=[5,4]")
         assert run("render", "s.toml", "-o", "x.png", *changes).code == 0
-        assert image.read("x.png")[0].shape == (4, 5, 4)
+        assert picture_file.read("x.png")[0].shape == (4, 5, 4)
         assert run("render", "s.toml", "-o", "x.png", *changes, "--size", "6x2").code == 0
-        assert image.read("x.png")[0].shape == (2, 6, 4)
+        assert picture_file.read("x.png")[0].shape == (2, 6, 4)
 
     def test_a_mesh(self, run: Any) -> None:
         Path("tri.v2.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
         changes = ("--set", "film.size=[8,6]", "--set", 'objects."tri.v2".material=gold', "--set", "film.samples=1")
         assert run("render", "tri.v2.obj", "-o", "x.png", *changes).code == 0
-        assert image.read("x.png")[0].shape == (6, 8, 4)
+        assert picture_file.read("x.png")[0].shape == (6, 8, 4)
 
     @pytest.mark.parametrize("command", ["render", "verify", "explain", "tradeoff"])
     @pytest.mark.parametrize(

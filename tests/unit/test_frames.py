@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from glshade.cli import cli
 from glshade.frames import parse, pictures
-from glshade.image import read
+from glshade.picture_file import read
 from glshade.scene_file import SceneFile
 
 SCENE = """

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glshade import AssetError, GlshadeError, Image
-from glshade.image import SUFFIXES, linear_to_srgb, read, srgb_to_linear
+from glshade.picture_file import SUFFIXES, attributes, read
+from glshade.srgb import linear_to_srgb, srgb_to_linear
 
 RAMP = np.linspace(0, 1, 48, dtype=np.float32).reshape(4, 4, 3)
 
@@ -96,6 +98,18 @@ def test_exr_keeps_every_bit_and_the_attributes(tmp_path: Path) -> None:
     source.close()
 
 
+@pytest.mark.parametrize("suffix", sorted(SUFFIXES - {".hdr"}))
+def test_a_file_says_what_it_was_told(suffix: str, tmp_path: Path) -> None:
+    told = {"glshade:digest": "0123abcd", "note": 'ä "quoted"'}
+    Image(RAMP, attributes=told).save(tmp_path / f"x{suffix}")
+    assert attributes(tmp_path / f"x{suffix}").items() >= told.items()
+
+
+def test_what_is_no_picture_says_nothing(tmp_path: Path) -> None:
+    (tmp_path / "x.png").write_bytes(b"no picture")
+    assert attributes(tmp_path / "x.png") == attributes(tmp_path / "y.png") == attributes(tmp_path) == {}
+
+
 def test_8_bits_in_a_float_file_are_decoded_with_a_word(tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match="render with dtype='float32'"):
         Image(np.full((1, 1, 3), 188, dtype=np.uint8), "srgb").save(tmp_path / "x.exr")
@@ -103,9 +117,12 @@ def test_8_bits_in_a_float_file_are_decoded_with_a_word(tmp_path: Path) -> None:
 
 
 def test_the_same_picture_is_the_same_bytes(tmp_path: Path) -> None:
-    for suffix in SUFFIXES - {".hdr"}:
-        for name in ("a", "b"):
+    for name in ("a", "b"):
+        for suffix in SUFFIXES:
             Image(RAMP).save(tmp_path / f"{name}{suffix}")
+        # Nor does the time of day make a difference, which files have to the second.
+        time.sleep(1.1)
+    for suffix in SUFFIXES:
         assert (tmp_path / f"a{suffix}").read_bytes() == (tmp_path / f"b{suffix}").read_bytes(), suffix
 
 

@@ -18,8 +18,8 @@ import pytest
 
 import glshade as package
 from glshade import BRDFS, LIGHTS, Scene, listing
-from glshade.image import linear_to_srgb
 from glshade.presets import PRESETS
+from glshade.srgb import linear_to_srgb
 
 
 @pytest.fixture

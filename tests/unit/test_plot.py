@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import glshade
-from glshade import BRDFS, evaluate, image, lobe, plots
+from glshade import BRDFS, evaluate, lobe, picture_file, plots
 from glshade.albedo import albedo
 from glshade.brdfs import Brdf
 from glshade.plots import pictures
@@ -33,7 +33,7 @@ def make(name: str, **parameters: Any) -> Brdf:
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
     """`run(*arguments)` gives (exit code, stdout, stderr) of glshade, in a folder that holds s.toml."""
-    image.Image(np.zeros((2, 2, 3), dtype=np.uint8)).save(tmp_path / "t.png")
+    glshade.Image(np.zeros((2, 2, 3), dtype=np.uint8)).save(tmp_path / "t.png")
     (tmp_path / "s.toml").write_text(SCENE)
     monkeypatch.chdir(tmp_path)
 
@@ -237,7 +237,7 @@ class TestFigures:
         for suffix in (".png", ".svg"):
             plots.save(made, tmp_path / f"x{suffix}")
         assert left(tmp_path) == ["x.png", "x.svg"]
-        assert np.ptp(image.read(tmp_path / "x.png")[0][..., :3]) > 0.9
+        assert np.ptp(picture_file.read(tmp_path / "x.png")[0][..., :3]) > 0.9
         text = (tmp_path / "x.svg").read_text()
         assert ElementTree.fromstring(text).tag.endswith("svg")
         assert "gold" in text
@@ -353,12 +353,12 @@ class TestCommand:
 
     def test_a_sheet_of_everything(self, run: Any, tmp_path: Path) -> None:
         assert run("plot", "plastic", "-o", "x.png", "--angles", "0,50", "--incidence", "30") == (0, "x.png\n", "")
-        assert image.read(tmp_path / "x.png")[0].shape[0] > 900
+        assert picture_file.read(tmp_path / "x.png")[0].shape[0] > 900
 
     @pytest.mark.parametrize("kind", ["lobe", "sphere", "furnace"])
     def test_bare_pictures(self, kind: str, run: Any, tmp_path: Path) -> None:
         assert run("plot", "lambert", "phong", "-k", kind, "--bare", "-o", "x.exr") == (0, "x.exr\n", "")
-        height, width, _ = image.read("x.exr")[0].shape
+        height, width, _ = picture_file.read("x.exr")[0].shape
         assert (width, height) == ((1600, 600) if kind == "lobe" else (1024, 512))
 
     @pytest.mark.parametrize(
