@@ -16,7 +16,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from glshade import formats
+from glshade import cache, formats
 from glshade.errors import AssetError
 from glshade.formats.contents import EMBEDDED, Contents, Material
 from glshade.mesh import Float64, Mesh
@@ -78,7 +78,7 @@ def load(path: Path) -> Model:
         raise AssetError(f"{path}: is empty")
 
     key = hashlib.sha256(f"{LOADER_VERSION}\0{full}\0".encode() + data).hexdigest()[:32]
-    folder = _cache_folder() / key
+    folder = cache.folder("meshes") / key
     contents = _recall(folder)
     if contents is None:
         contents = formats.read(path, full.parent, data)
@@ -111,11 +111,6 @@ def _stamps(paths: Any) -> dict[Path, Stamp]:
 
 
 # --- cache -----------------------------------------------------------------------------------------------------------
-
-
-def _cache_folder() -> Path:
-    base = os.environ.get("XDG_CACHE_HOME")
-    return Path(base or os.path.expanduser("~/.cache")) / "glshade" / "meshes"
 
 
 def _recall(folder: Path) -> Contents | None:

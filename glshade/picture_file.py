@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal
@@ -11,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.atomic import replacing
 from glshade.errors import AssetError, GlshadeError
 from glshade.srgb import srgb_to_linear
 
@@ -84,23 +84,20 @@ def write(
             spec.attribute(name, value)
     if not path.parent.is_dir():
         raise GlshadeError(f"{path}: the folder {path.parent} does not exist; make it first")
-    beside = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
-        output = oiio.ImageOutput.create(str(beside))
-        if output is None:
-            raise GlshadeError(f"{path}: cannot be written: {_one_line(oiio.geterror())}")
-        written = output.open(str(beside), spec) and output.write_image(np.ascontiguousarray(pixels))
-        # A full disk may show in the message alone: what was buffered is written when the file is closed. (TIFF's message
-        # may be of an Exif table that it could not make, which is no loss.)
-        closed = output.close()
-        message = _one_line(output.geterror())
-        if not (closed and written) or (message and "Exif" not in message):
-            raise GlshadeError(f"{path}: cannot be written: {message or _one_line(oiio.geterror())}")
-        os.replace(beside, path)
+        with replacing(path) as beside:
+            output = oiio.ImageOutput.create(str(beside))
+            if output is None:
+                raise GlshadeError(f"{path}: cannot be written: {_one_line(oiio.geterror())}")
+            written = output.open(str(beside), spec) and output.write_image(np.ascontiguousarray(pixels))
+            # A full disk may show in the message alone: what was buffered is written when the file is closed. (TIFF's
+            # message may be of an Exif table that it could not make, which is no loss.)
+            closed = output.close()
+            message = _one_line(output.geterror())
+            if not (closed and written) or (message and "Exif" not in message):
+                raise GlshadeError(f"{path}: cannot be written: {message or _one_line(oiio.geterror())}")
     except OSError as error:
         raise GlshadeError(f"{path}: cannot be written: {error.strerror}") from None
-    finally:
-        beside.unlink(missing_ok=True)
 
 
 def attributes(path: str | Path) -> dict[str, str]:

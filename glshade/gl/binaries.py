@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TypeAlias
 
+from glshade import cache
+
 # An entry: this line, a digest of the key and of all that follows, the driver's number of the format, the data.
 MAGIC = b"glshade program 1\n"
 START = len(MAGIC) + hashlib.sha256().digest_size
@@ -26,8 +28,7 @@ class Binaries:
 
     def __init__(self, folder: Path | None = None, largest: int = LARGEST) -> None:
         """folder: left out, the programs' part of the user's cache folder. largest: what it may hold [bytes]."""
-        base = os.environ.get("XDG_CACHE_HOME")
-        self.folder = folder or Path(base or os.path.expanduser("~/.cache")) / "glshade" / "programs"
+        self.folder = folder or cache.folder("programs")
         self._largest = largest
         # What the folder holds [bytes], as far as this process knows; None until it has written.
         self._held: int | None = None

@@ -6,13 +6,13 @@ same whenever it is made.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
+from glshade.atomic import replacing
 from glshade.brdfs import Brdf
 from glshade.errors import GlshadeError
 from glshade.lobe import Quantity
@@ -103,13 +103,9 @@ def save(figure: Figure, path: str | Path) -> None:
         ".pdf": {"CreationDate": None, "Creator": "glshade"},
     }
     suffix = path.suffix.lower()
-    beside = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
     try:
         # Not as the user's own style would have it: ticks are made now. Names of clip paths would be random without a salt.
-        with style.context(["default", STYLE, {"svg.hashsalt": "glshade"}]):
+        with replacing(path) as beside, style.context(["default", STYLE, {"svg.hashsalt": "glshade"}]):
             figure.savefig(beside, format=suffix[1:], metadata=metadata[suffix])
-        os.replace(beside, path)
     except OSError as error:
         raise GlshadeError(f"{path}: cannot be written: {error.strerror}") from None
-    finally:
-        beside.unlink(missing_ok=True)

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade import __version__, reference
+from glshade import __version__, cache, reference
+from glshade.atomic import replacing
 from glshade.digest import digest
 from glshade.errors import GlshadeError
 from glshade.quality import Quality
@@ -361,9 +362,8 @@ def _grouped(objects: Sequence[Object], pixels: Array) -> list[list[int]]:
 
 
 def _place(scene: Scene, driver: str, limits: dict[str, float], count: int) -> Path | None:
-    base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     key = json.dumps([digest(scene), driver, limits, count, __version__], sort_keys=True)
-    return Path(base) / "glshade" / "budgets" / f"{hashlib.sha256(key.encode()).hexdigest()}.json"
+    return cache.folder("budgets") / f"{hashlib.sha256(key.encode()).hexdigest()}.json"
 
 
 def _known(path: Path | None) -> Choice | None:
@@ -376,11 +376,8 @@ def _known(path: Path | None) -> Choice | None:
 def _remember(path: Path | None, choice: Choice) -> None:
     if path is None:
         return
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
+    # A cache that cannot be written costs time and nothing else.
+    with suppress(OSError):
         path.parent.mkdir(parents=True, exist_ok=True)
-        beside.write_text(json.dumps(choice.as_dict()), encoding="utf-8")
-        beside.replace(path)
-    except OSError:
-        # A cache that cannot be written costs time and nothing else.
-        beside.unlink(missing_ok=True)
+        with replacing(path) as beside:
+            beside.write_text(json.dumps(choice.as_dict()), encoding="utf-8")

@@ -7,7 +7,6 @@ import csv
 import io
 import json
 import math
-import os
 import re
 import tempfile
 from collections.abc import Iterator
@@ -20,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade import __version__
+from glshade.atomic import replacing
 from glshade.comparison.report import LEAST, RAMP, heat
 from glshade.errors import GlshadeError
 from glshade.image import Image
@@ -396,11 +396,8 @@ def _jpeg(image: Image) -> str:
 
 
 def _write(path: Path, text: str) -> None:
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        beside.write_text(text, encoding="utf-8")
-        beside.replace(path)
+        with replacing(path) as beside:
+            beside.write_text(text, encoding="utf-8")
     except OSError as error:
         raise GlshadeError(f"{path}: cannot be written: {error.strerror}") from None
-    finally:
-        beside.unlink(missing_ok=True)

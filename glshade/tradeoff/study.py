@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import json
 import math
-import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,6 +20,7 @@ from numpy.typing import NDArray
 
 from glshade import __version__, reference
 from glshade.assembly import assemble
+from glshade.atomic import replacing
 from glshade.digest import digest
 from glshade.scene import Scene
 from glshade.tradeoff.front import Timing, dominated
@@ -256,6 +256,5 @@ def _taken_up(path: Path | None, head: dict[str, Any]) -> dict[Setting, Point]:
 def _keep(path: Path | None, head: dict[str, Any], found: dict[Setting, Point]) -> None:
     if path is None:
         return
-    beside = path.with_name(f".{path.name}.{os.getpid()}")
-    beside.write_text(json.dumps({"of": head, "points": [point.as_dict() for point in found.values()]}), encoding="utf-8")
-    beside.replace(path)
+    with replacing(path) as beside:
+        beside.write_text(json.dumps({"of": head, "points": [point.as_dict() for point in found.values()]}), encoding="utf-8")
