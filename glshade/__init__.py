@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from glshade.gl.renderer import Renderer as Renderer
     from glshade.gl.renderer import render as render
     from glshade.image import Image as Image
+    from glshade.layers import Layers as Layers
     from glshade.lights import LIGHTS as LIGHTS
     from glshade.mesh import Mesh as Mesh
     from glshade.plan import Plan as Plan
@@ -48,6 +49,7 @@ _HOME = {
     "GlshadeError": "errors",
     "Image": "image",
     "LIGHTS": "lights",
+    "Layers": "layers",
     "Mesh": "mesh",
     "NormalMap": "texture",
     "Object": "scene",

@@ -33,6 +33,10 @@ Array = NDArray[np.float64]
 FRAMED_EXACTLY = 200_000
 
 
+# depth: with the instance's number beside it.
+Shows = Literal["light", "depth", "uv", "normal"]
+
+
 @dataclass(frozen=True, eq=False)
 class Instance:
     """One mesh in its place.
@@ -40,7 +44,8 @@ class Instance:
     name: the object's, for messages. mesh: ready for its rate (faceted for flat), with tangents where they are asked for.
     world_from_object (4, 4) float64, for positions relative to the mesh's own origin. back_faces: whether they are drawn.
     lights: which of the assembly's reach it. quality: the object's and the scene's together; rate and mesh have it in them.
-    number: of the scene's objects, which one.
+    number: of the scene's objects, which one. made_of: its material's name, or that of the first object or part which has it.
+    shows: light, or what else of its surface a picture has in that place.
     """
 
     name: str
@@ -53,6 +58,8 @@ class Instance:
     lights: tuple[int, ...]
     quality: Quality
     number: int
+    made_of: str
+    shows: Shows = "light"
 
     @cached_property
     def mirrored(self) -> bool:
@@ -62,11 +69,15 @@ class Instance:
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """Instances in scene order, the lights (a default rig where the scene has none), and the view."""
+    """Instances in scene order, the lights (a default rig where the scene has none), and the view.
+
+    unit: how long the scene's unit of length is here; 1 but where float32 could not hold the squares of lengths.
+    """
 
     instances: tuple[Instance, ...]
     lights: tuple[Light, ...]
     view: View
+    unit: float = 1.0
 
 
 def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
@@ -75,7 +86,7 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
     Errors: SceneError (AssetError) with every fault of every mesh, material and texture coordinate.
     """
     problems: list[str] = []
-    pieces: list[tuple[Object, str, Mesh, Array, Brdf]] = []
+    pieces: list[tuple[Object, str, Mesh, Array, Brdf, str]] = []
     by_name = {item.name: item for item in scene.objects}
     numbers = {id(item): index for index, item in enumerate(scene.objects)}
     for index, item in enumerate(scene.objects):
@@ -85,15 +96,15 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
             problems.extend(f"objects[{index}].mesh: {problem}" for problem in error.problems)
     if problems:
         raise SceneError(problems)
-    boxes = [_corners(mesh.bounds, world) for _, _, mesh, world, _ in pieces]
+    boxes = [_corners(mesh.bounds, world) for _, _, mesh, world, *_ in pieces]
     width, height = scene.film.size
     points = boxes
-    if scene.camera.framing and sum(len(mesh.positions) for _, _, mesh, _, _ in pieces) <= FRAMED_EXACTLY:
-        points = [_placed(mesh.positions + mesh.origin, world) for _, _, mesh, world, _ in pieces]
+    if scene.camera.framing and sum(len(mesh.positions) for _, _, mesh, *_ in pieces) <= FRAMED_EXACTLY:
+        points = [_placed(mesh.positions + mesh.origin, world) for _, _, mesh, world, *_ in pieces]
     view = scene.camera.view(np.concatenate(points), width / height)
     lights = scene.lights if scene.lights is not None else rig(view)
     instances = []
-    for (item, name, mesh, world, material), box in zip(pieces, boxes, strict=True):
+    for (item, name, mesh, world, material, made_of), box in zip(pieces, boxes, strict=True):
         chosen = tuple(
             i
             for i, light in enumerate(lights)
@@ -111,7 +122,8 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
         local = world.copy()
         local[:3, 3] += world[:3, :3] @ mesh.origin
         colours = item.vertex_colours and mesh.colours is not None
-        instances.append(Instance(name, ready, local, material, rate, back_faces, colours, chosen, quality, numbers[id(item)]))
+        number = numbers[id(item)]
+        instances.append(Instance(name, ready, local, material, rate, back_faces, colours, chosen, quality, number, made_of))
     if problems:
         raise SceneError(problems)
     assembly = _in_range(Assembly(tuple(instances), tuple(lights), view), np.concatenate(boxes))
@@ -146,6 +158,7 @@ def _in_range(assembly: Assembly, corners: Array) -> Assembly:
             half_width=view.half_width * across,
             half_height=view.half_height * across,
         ),
+        unit,
     )
 
 
@@ -166,19 +179,23 @@ def rig(view: View) -> tuple[Light, ...]:
 
 def _pieces(
     scene: Scene, by_name: dict[str | None, Object], item: Object, name: str
-) -> Iterator[tuple[Object, str, Mesh, Array, Brdf]]:
-    """(object, name, mesh, world_from_object, material): one for each part of its mesh file."""
+) -> Iterator[tuple[Object, str, Mesh, Array, Brdf, str]]:
+    """(object, name, mesh, world_from_object, material, its name): one for each part of its mesh file."""
     world = _world(by_name, item)
     own = scene.materials[item.material] if isinstance(item.material, str) else item.material
+    own_name = item.material if isinstance(item.material, str) else name if own else DEFAULT_NAME
     if item.shape is not None:
-        yield item, name, item.shape.mesh(), world, own or DEFAULT_MATERIAL
+        yield item, name, item.shape.mesh(), world, own or DEFAULT_MATERIAL, own_name
     elif isinstance(item.mesh, Mesh):
-        yield item, name, item.mesh, world, own or DEFAULT_MATERIAL
+        yield item, name, item.mesh, world, own or DEFAULT_MATERIAL, own_name
     elif item.mesh is not None:
         model = mesh_file.load(item.mesh)
+        # Parts of one material may share it.
+        first: dict[str, str] = {repr(None): DEFAULT_NAME}
         for part in model.parts:
             label = f"{name}/{part.name}" if len(model.parts) > 1 else name
-            yield item, label, part.mesh, world @ part.transform, own or _file_material(part, item.mesh)
+            made_of = own_name if own else first.setdefault(repr(part.material), label)
+            yield item, label, part.mesh, world @ part.transform, own or _file_material(part, item.mesh), made_of
 
 
 @lru_cache(maxsize=4096)
@@ -194,6 +211,7 @@ def _file_material(part: mesh_file.Part, path: Path) -> Brdf:
         ) from None
 
 
+DEFAULT_NAME = "default"
 DEFAULT_MATERIAL: Brdf = BRDFS["phong"].model_validate({"kd": 0.6, "ks": 0.25, "exponent": 50.0})
 
 

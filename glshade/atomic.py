@@ -8,15 +8,20 @@ from contextlib import contextmanager
 from pathlib import Path
 
 
+def beside(path: Path, process: int) -> Path:
+    """What a process writes to before it takes the place of `path`."""
+    return path.with_name(f".{path.stem}.{process}{path.suffix}")
+
+
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A path beside `path` to write to, which takes its place where the block ends well, and goes where it does not.
 
     Errors: OSError.
     """
-    beside = path.with_name(f".{path.stem}.{os.getpid()}{path.suffix}")
+    written = beside(path, os.getpid())
     try:
-        yield beside
-        os.replace(beside, path)
+        yield written
+        os.replace(written, path)
     finally:
-        beside.unlink(missing_ok=True)
+        written.unlink(missing_ok=True)

@@ -46,8 +46,8 @@ def _cones(mesh: Mesh) -> tuple[Array, Array, Array, Array]:
     return axis, sine, middle, np.sqrt(square.max(axis=1))
 
 
-def facing(instance: Instance, view: View) -> NDArray[np.intp] | None:
-    """The triangles, without the clusters that show the viewer nothing but their backs; None: all of them.
+def facing(instance: Instance, view: View) -> NDArray[np.uint32] | None:
+    """(N, 3) the triangles, without the clusters that show the viewer nothing but their backs; None: all of them.
 
     Shirman and Abi-Ezzi 1993's cone test, in the mesh's own space, where every affine transform keeps sides.
     """
@@ -67,6 +67,7 @@ def facing(instance: Instance, view: View) -> NDArray[np.intp] | None:
         hidden = axis @ (forward / np.linalg.norm(forward)) >= sine + EDGE_ON
     if not hidden.any():
         return None
-    shown = np.ones(len(mesh.triangles), dtype=bool)
-    shown[: len(hidden) * SIZE] = np.repeat(~hidden, SIZE)
-    return np.flatnonzero(shown)
+    whole = len(hidden) * SIZE
+    # A cluster at a time: numpy moves 32 triangles as fast as one.
+    shown = mesh.triangles[:whole].reshape(-1, 3 * SIZE)[~hidden].reshape(-1, 3)
+    return np.concatenate([shown, mesh.triangles[whole:]])

@@ -182,7 +182,8 @@ def _triple(value: Any) -> Any:
     return tuple(value)
 
 
-def _resolve(path: Path, info: ValidationInfo) -> Path:
+def resolved(path: Path, info: ValidationInfo) -> Path:
+    """The path, from the folder of the scene file; refuses what is no file."""
     folder = (info.context or {}).get("folder")
     path = path.expanduser()
     path = path if path.is_absolute() or folder is None else Path(folder) / path
@@ -203,7 +204,7 @@ Triple = Annotated[
     WithJsonSchema({"anyOf": [_NUMBER, {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}]}),
 ]
 # A file that exists; relative paths start at the folder of the scene file.
-File = Annotated[Path, AfterValidator(_resolve)]
+File = Annotated[Path, AfterValidator(resolved)]
 
 
 def non_zero(value: Vector3) -> Vector3:

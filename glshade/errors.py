@@ -15,6 +15,12 @@ class GlshadeError(Exception):
     exit_code = 1
 
 
+class MissingLibrary(GlshadeError):
+    """What is asked for needs a library that an extra brings."""
+
+    exit_code = 2
+
+
 class SceneError(GlshadeError):
     """A scene, or a file it names, is not usable.
 

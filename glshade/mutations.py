@@ -145,8 +145,8 @@ class MutatedRenderer(Renderer):
         self._prepared.clear()
         return super().render(scene, **options)
 
-    def _program(self, source: Source) -> Any:
-        return super()._program(mutated(source, self.mutation) if self.mutation else source)
+    def _program(self, source: Source, flat: bool = False) -> Any:
+        return super()._program(mutated(source, self.mutation) if self.mutation else source, flat)
 
 
 @dataclass(frozen=True, eq=False)

@@ -42,16 +42,17 @@ def write(
     pixels: NDArray[Any],
     *,
     channels: Sequence[str] | None = None,
-    linear: bool = False,
+    encoding: str = "srgb",
     attributes: Mapping[str, str] | None = None,
     corner: tuple[int, int] = (0, 0),
     whole: tuple[int, int] | None = None,
 ) -> None:
     """pixels (H, W, C), uint8 or float32, row 0 at the top; the extension says how.
 
-    channels: their names; left out: R, G, B, A. linear: 8-bit numbers that are not sRGB-encoded. attributes: what the file says
-    of itself; HDR has no room for them. corner, whole: of a crop, where it lies and the size of the picture that it is of
-    [pixels]; OpenEXR keeps both. Errors: GlshadeError.
+    channels: their names; left out: R, G, B, A. encoding: of 8-bit numbers: srgb, linear, or the colour interop id of another
+    colour space; PNG has a chunk for what video knows. attributes: what the file says of itself; HDR has no room for them.
+    corner, whole: of a crop, where it lies and the size of the picture that it is of [pixels]; OpenEXR keeps both.
+    Errors: GlshadeError.
     """
     import OpenImageIO as oiio
 
@@ -67,8 +68,10 @@ def write(
         spec.x, spec.y = corner
         spec.full_width, spec.full_height = whole or (width, height)
     # sRGB is what everybody takes an 8-bit file for, and saying so would load a colour configuration for 20 ms.
-    if linear or pixels.dtype == np.float32:
+    if pixels.dtype == np.float32 or encoding == "linear":
         spec.attribute("oiio:ColorSpace", "lin_rec709")
+    elif encoding != "srgb":
+        spec.attribute("oiio:ColorSpace", encoding)
     if pixels.dtype == np.uint8 and count == 4:
         spec.attribute("oiio:UnassociatedAlpha", 1)
     spec.attribute("png:compressionLevel", PNG_LEVEL)

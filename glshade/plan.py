@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from glshade.assembly import Assembly, Instance, assemble
+from glshade.assembly import Assembly, Instance, Shows, assemble
 from glshade.brdfs import BRDFS, Array, Brdf
 from glshade.lights import Falloff, Light
 from glshade.scene import Rate, Scene
@@ -83,7 +83,7 @@ class ProgramPlan:
     picture it reads too). alpha_from: the parameter whose texture carries alpha. ambient: constant where it adds the same
     colour everywhere. normal_map: bump maps are normal maps by then; normal_span: how often the unit of texture coordinates
     goes into its texels. turned: the tangent, by one angle; direction_map: by a picture. normalise: interpolated normals.
-    arithmetic: fast puts textbook forms in place of the stable ones.
+    arithmetic: fast puts textbook forms in place of the stable ones. shows: light, or what else of the surface in its place.
     """
 
     rate: Rate
@@ -106,15 +106,21 @@ class ProgramPlan:
     direction_map: bool = False
     normalise: bool = True
     arithmetic: Literal["stable", "fast"] = "stable"
+    shows: Shows = "light"
 
     @property
     def directed(self) -> bool:
         """Whether any light comes from a direction, so that normal and viewer matter."""
-        return bool(self.lights)
+        return bool(self.lights) or self.shows == "normal"
 
     @property
     def positions(self) -> bool:
         """Whether the shading needs to know where the point is."""
+        if self.shows == "normal":
+            # A face seen from both sides asks where the viewer is.
+            return self.rate == "flat" and self.both_sides and self.viewer == "perspective"
+        if self.shows == "depth":
+            return True
         placed = any(group.falloff != "none" or group.type != "directional" for group in self.lights)
         return placed or (self.directed and self.viewer == "perspective")
 
@@ -137,7 +143,7 @@ class ProgramPlan:
     @property
     def mapped(self) -> bool:
         """Whether the shading reads any texture."""
-        return bool(self.textured) or self.normal_map or self.direction_map
+        return bool(self.textured) or self.normal_map or self.direction_map or self.shows == "uv"
 
     def picture_of(self, name: str) -> str:
         """The parameter under whose name the texture of `name` is bound."""
@@ -158,6 +164,8 @@ class ProgramPlan:
         extras += ["normals not normalised"] * (not self.normalise) + ["fast arithmetic"] * (self.arithmetic == "fast")
         extras += ["both sides"] * self.both_sides + [f"alpha {self.alpha}"] * (self.alpha != "opaque")
         model = self.brdf + f" ({', '.join(self.parts)})" * bool(self.parts)
+        if self.shows != "light":
+            return ", ".join([f"{self.shows} per {PER[self.rate]}", self.viewer, *extras])
         return ", ".join(
             [f"{model} per {PER[self.rate]}", " + ".join(lights) or "no light", self.viewer, *extras, self.encoding]
         )
@@ -187,6 +195,8 @@ class Plan:
 
 def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["linear", "srgb"]) -> ProgramPlan:
     """The program for one instance, in canonical form: what cannot show is left out."""
+    if instance.shows != "light":
+        return _bare(instance, assembly, encoding)
     reached = [assembly.lights[i] for i in instance.lights]
     ambient = any(light.omnidirectional for light in reached)
     kinds = Counter(kind(light) for light in reached if not light.omnidirectional)
@@ -204,7 +214,7 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         shares = {False: count - white[name, falloff], True: white[name, falloff]}
         groups += [LightGroup(name, falloff, grey, share) for grey, share in shares.items() if share]
     # Where no texture or vertex colour takes part, ambient light adds one colour, which is worked out beforehand.
-    base = next((name for name, declared in model.parameters().items() if declared.base), None)
+    base = model.base()
     seen = _with_equals(material, material.asked("ambient"))
     varies = (instance.vertex_colours and base in seen) or any(isinstance(getattr(material, name), Texture) for name in seen)
     how: Literal["none", "constant", "varying"] = "varying" if ambient and varies else "none"
@@ -258,6 +268,35 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
     )
 
 
+def _bare(instance: Instance, assembly: Assembly, encoding: Literal["linear", "srgb"]) -> ProgramPlan:
+    """The program that shows something else than light: no model and no light is in it, but what is cut out is."""
+    material = instance.material
+    base = material.base()
+    masked = material.alpha_mode == "mask"
+    carries_alpha = masked and base is not None and isinstance(getattr(material, base), Texture)
+    vertex_alpha = masked and instance.vertex_colours
+    whole = not (carries_alpha or vertex_alpha) and material.alpha >= material.alpha_cutoff
+    normal = instance.shows == "normal"
+    return ProgramPlan(
+        rate=instance.rate,
+        brdf=material.brdf,
+        slots=(),
+        parameters=(),
+        lights=(),
+        ambient="none",
+        viewer="perspective" if assembly.view.perspective else "orthographic",
+        both_sides=normal and instance.back_faces,
+        alpha="mask" if masked and not whole else "opaque",
+        alpha_from=base if carries_alpha else None,
+        vertex_colours=vertex_alpha,
+        normal_map=normal and bool(material.normal_map or material.bump_map),
+        anisotropic=False,
+        encoding=encoding,
+        normal_span=texels(material, "bump_map").span if normal and material.bump_map else (1, 1),
+        shows=instance.shows,
+    )
+
+
 def _with_equals(material: Brdf, asked: frozenset[str]) -> frozenset[str]:
     """The parameters that are asked for, and those that they equal where they are left out."""
     declared = material.parameters()
@@ -296,7 +335,7 @@ def explain(scene: Scene, shading: Rate | None = None) -> Plan:
     assembly = assemble(scene, shading)
     film, storage = scene.film, scene.quality.storage
     # What is averaged, blended or added afterwards is drawn in linear light.
-    direct = film.samples == 1 and len(film.background) == 3 and storage in (None, "auto")
+    direct = film.direct and storage in (None, "auto")
     direct &= not any(i.material.alpha_mode == "blend" or _has_pages(i, assembly) for i in assembly.instances)
     return plan(assembly, film.encoding if direct else "linear")
 

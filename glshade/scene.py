@@ -2,18 +2,30 @@
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
+from numbers import Integral
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, SkipValidation, Tag, WithJsonSchema, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    Discriminator,
+    Field,
+    SkipValidation,
+    Tag,
+    ValidationInfo,
+    WithJsonSchema,
+    model_validator,
+)
 
 from glshade.animation import Track
 from glshade.brdfs import BRDFS, Brdf
 from glshade.camera import CAMERAS, Camera, Matrix4, Perspective, affine
-from glshade.document import Chosen, Document, File, Finite, Triple, Vector3, fault, nearest, number
+from glshade.document import Chosen, Document, File, Finite, Triple, Vector3, fault, nearest, number, resolved
 from glshade.errors import AssetError
+from glshade.layers import AOVS
 from glshade.lights import LIGHTS, Light
 from glshade.mesh import Mesh
 from glshade.presets import PRESETS, FromPreset, preset
@@ -28,6 +40,9 @@ Sides = Literal["auto", "front", "both"]
 # The largest side of a picture: 2^17 pixels of 16 bytes in one row are 2 MiB, still a file that other programs open.
 LARGEST_SIDE = 131072
 Side = Annotated[int, Field(ge=1, le=LARGEST_SIDE), BeforeValidator(number)]
+Corner = Annotated[int, Field(ge=0, lt=LARGEST_SIDE), BeforeValidator(number)]
+# 16 x 16 pictures take 256 times as long as one: a larger number is a slip of the pen.
+LARGEST_SUPERSAMPLE = 16
 
 
 def _scale(value: Vector3) -> Vector3:
@@ -150,17 +165,86 @@ def _colour_with_alpha(value: tuple[float, ...]) -> tuple[float, ...]:
     return value
 
 
+def _configuration(value: Any, info: ValidationInfo) -> Any:
+    """A file, or the name of one that OpenColorIO carries itself."""
+    if not isinstance(value, str | Path) or str(value).startswith("ocio://"):
+        return value
+    return resolved(Path(value), info)
+
+
+def _aov(value: str) -> str:
+    if value not in AOVS:
+        raise fault(f"unknown layer {value!r}" + nearest(value, AOVS))
+    return value
+
+
+Aov = Annotated[str, AfterValidator(_aov), WithJsonSchema({"enum": list(AOVS)})]
+
+
 class Film(Document):
     """What the picture is recorded on."""
 
     size: tuple[Side, Side] = Field((512, 512), description="width, height [pixels]")
+    crop: tuple[Corner, Corner, Side, Side] | None = Field(
+        None,
+        description="x, y, width, height from the top left [pixels]: only this window is drawn, to the same bits",
+    )
     samples: Literal[1, 2, 4, 8] = Field(1, description="samples a pixel for smooth edges, resolved in linear light")
+    supersample: Annotated[int, Field(ge=1, le=LARGEST_SUPERSAMPLE), BeforeValidator(number)] = Field(
+        1,
+        description="n: the mean, in linear light, of n x n pictures shifted within the pixel; smooths shading and edges",
+    )
     background: Annotated[tuple[Finite, ...], AfterValidator(_colour_with_alpha)] = Field(
         (0.0, 0.0, 0.0),
         description="linear Rec. 709; with a fourth number, straight alpha, the picture has alpha too",
     )
     encoding: Literal["srgb", "linear"] = Field("srgb", description="of 8-bit pictures; EXR is always linear")
     exposure: Annotated[float, Field(ge=-64, le=64)] = Field(0.0, description="doubles all light [stops]")
+    view: str | None = Field(
+        None, description="OpenColorIO view through which 8-bit pictures are seen; left out beside a display: its default"
+    )
+    display: str | None = Field(None, description="OpenColorIO display that they are for; left out beside a view: the default")
+    ocio: Annotated[Path | str, BeforeValidator(_configuration)] | None = Field(
+        None, description="OpenColorIO configuration, a file or ocio://NAME; left out: $OCIO, else OpenColorIO's own default"
+    )
+    aovs: tuple[Aov, ...] = Field((), description="layers beside the picture: docs/layers.md says what each is")
+
+    @classmethod
+    def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
+        size, crop = _get(data, "size") or cls.model_fields["size"].default, _get(data, "crop")
+        if _whole_numbers(size, 2) and _whole_numbers(crop, 4):
+            (width, height), (x, y, w, h) = size, crop
+            if x + w > width or y + h > height:
+                yield ("crop",), f"reaches to {x + w}, {y + h}, beyond the picture, which is {width} x {height}"
+        transformed = _get(data, "view") is not None or _get(data, "display") is not None
+        if _get(data, "ocio") is not None and not transformed:
+            yield ("ocio",), "says nothing without a view or a display"
+        if transformed and _get(data, "encoding") == "linear":
+            yield ("encoding",), "linear does not go together with a view transform, which encodes"
+
+    @property
+    def window(self) -> tuple[int, int, int, int]:
+        """x, y, width, height [pixels] of what is drawn: the crop, else the whole."""
+        return self.crop or (0, 0, *self.size)
+
+    @property
+    def transformed(self) -> bool:
+        """Whether 8-bit pictures go through a view transform."""
+        return self.view is not None or self.display is not None
+
+    @property
+    def pictures(self) -> int:
+        """How many samples of any kind a pixel is the mean of."""
+        return self.samples * self.supersample**2
+
+    @property
+    def direct(self) -> bool:
+        """Whether a surface's 8-bit numbers are those of the picture: nothing is averaged or transformed in between."""
+        return self.pictures == 1 and len(self.background) == 3 and not self.transformed
+
+
+def _whole_numbers(value: Any, count: int) -> bool:
+    return isinstance(value, list | tuple) and len(value) == count and all(isinstance(item, Integral) for item in value)
 
 
 def _get(item: Any, key: str) -> Any:

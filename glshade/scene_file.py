@@ -55,12 +55,21 @@ class SceneFile:
             raise SceneError(f"{self.path}: {suffix or 'no extension'} is neither a scene nor a mesh; known: {known}")
         self.document = _overridden(document, overrides, self.path)
         self._as_written = self.document is document
-        self._checked: set[Path] = set()
+        # Textures' files that could be read, and the last scene whose files all could.
+        self._probed: set[Path] = set()
+        self._checked: Scene | None = None
+        # By camera: the last scene, and it through that camera.
+        self._seen: dict[str, tuple[Scene, Scene]] = {}
 
     @cached_property
+    def _written(self) -> Scene:
+        """The scene as it is written."""
+        return parse(self.document, self.path)
+
+    @property
     def cameras(self) -> tuple[str, ...]:
         """The names of its cameras."""
-        return tuple(parse(self.document, self.path).cameras)
+        return tuple(self._written.cameras)
 
     def scene(self, frame: float | None = None, camera: str | None = None) -> Scene:
         """The scene at a frame, as it is written where that is None, through one of its cameras.
@@ -80,48 +89,80 @@ class SceneFile:
             raise SceneError([fault if fault in own else f"{fault} (from --set)" for fault in error.problems]) from None
 
     def _scene(self, frame: float | None, camera: str | None) -> Scene:
-        document = self.document
-        if frame is not None:
-            document = self._at(frame)
+        scene = self._written if frame is None else self._at(frame)
         if camera is not None:
             if camera not in self.cameras:
                 raise SceneError(f'{self.path}: no camera is named "{camera}"{nearest(camera, self.cameras)}')
-            document = {**document, "camera": document["cameras"][camera]}
-        scene = parse(document, self.path)
+            scene = self._through(camera, scene)
         self._check(scene)
         return scene
 
-    def _at(self, frame: float) -> Any:
-        tracks = parse(self.document, self.path).animation
-        if not tracks:
-            return self.document
+    def _at(self, frame: float) -> Scene:
+        """The scene at a frame: what its tracks leave alone is not validated again, and stays the same object."""
+        written = self._written
+        if not written.animation:
+            return written
         from glshade.animation import at_frame
         from glshade.override import OverrideError
 
         try:
-            return at_frame(self.document, tracks, frame)
+            document = at_frame(self.document, written.animation, frame)
         except OverrideError as error:
             raise SceneError(f"{self.path}: animation: {error}") from None
+        return parse(_merged(written, self.document, document), self.path)
+
+    def _through(self, camera: str, scene: Scene) -> Scene:
+        """The scene seen by one of its cameras; the same object for the same scene."""
+        if camera not in self._seen or self._seen[camera][0] is not scene:
+            self._seen[camera] = scene, scene.model_copy(update={"camera": scene.cameras[camera]})
+        return self._seen[camera][1]
 
     def _check(self, scene: Scene) -> None:
-        """Looks at the files that the scene names, each once."""
+        """Looks at the files that the scene names: meshes always, textures where they are new."""
         problems: list[str] = []
+        meshes: dict[Path, tuple[str, ...]] = {}
         for index, item in enumerate(scene.objects):
-            if isinstance(item.mesh, Path):
-                try:
-                    mesh_file.load(item.mesh)
-                except SceneError as error:
-                    problems.extend(f"{self.path}: objects[{index}].mesh: {problem}" for problem in error.problems)
-        for place, picture in _pictures(scene):
-            if picture in self._checked:
+            if not isinstance(item.mesh, Path):
+                continue
+            if item.mesh not in meshes:
+                meshes[item.mesh] = _faults(item.mesh)
+            problems.extend(f"{self.path}: objects[{index}].mesh: {problem}" for problem in meshes[item.mesh])
+        for place, picture in _pictures(scene, self._checked):
+            if picture in self._probed:
                 continue
             try:
                 probe(picture)
-                self._checked.add(picture)
+                self._probed.add(picture)
             except AssetError as error:
                 problems.append(f"{self.path}: {place}: {error}")
         if problems:
             raise SceneError(problems)
+        self._checked = scene
+
+
+def _faults(mesh: Path) -> tuple[str, ...]:
+    """What is wrong with a mesh's file."""
+    try:
+        mesh_file.load(mesh)
+    except SceneError as error:
+        return error.problems
+    return ()
+
+
+def _merged(written: Scene, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+    """`after`, with what it shares with `before` as it was validated in `written`."""
+    merged: dict[str, Any] = {}
+    for key, value in after.items():
+        known, old = getattr(written, key), before.get(key)
+        if value is old:
+            merged[key] = known
+        elif isinstance(value, list) and isinstance(old, list):
+            merged[key] = [k if new is o else new for k, new, o in zip(known, value, old, strict=True)]
+        elif key in ("materials", "cameras") and isinstance(old, Mapping):
+            merged[key] = {name: known[name] if new is old.get(name) else new for name, new in value.items()}
+        else:
+            merged[key] = value
+    return merged
 
 
 def _overridden(document: Any, overrides: Overrides, path: Path) -> Any:
@@ -146,16 +187,21 @@ def _overridden(document: Any, overrides: Overrides, path: Path) -> Any:
     return document
 
 
-def _pictures(scene: Scene) -> Iterator[tuple[str, Path]]:
-    """(key path, file) of every texture."""
-    materials: dict[str, Any] = {f"materials.{name}": material for name, material in scene.materials.items()}
-    materials |= {f"objects[{index}].material": item.material for index, item in enumerate(scene.objects)}
-    for place, material in materials.items():
-        if isinstance(material, Document):
+def _pictures(scene: Scene, known: Scene | None) -> Iterator[tuple[str, Path]]:
+    """(key path, file) of every texture of the materials that `known` has not."""
+    seen = {id(material) for _, material in _materials(known)} if known else set()
+    for place, material in _materials(scene):
+        if isinstance(material, Document) and id(material) not in seen:
             for name in type(material).model_fields:
                 value = getattr(material, name)
                 if isinstance(value, Picture):
                     yield f"{place}.{name}.texture", value.texture
+
+
+def _materials(scene: Scene) -> Iterator[tuple[str, Any]]:
+    """(key path, material) of all that the scene lists, and all that its objects have of their own."""
+    yield from ((f"materials.{name}", material) for name, material in scene.materials.items())
+    yield from ((f"objects[{index}].material", item.material) for index, item in enumerate(scene.objects))
 
 
 # Behind a bare mesh: a dark grey that light and dark objects both stand out from.

@@ -34,6 +34,10 @@ class Stage:
     text: str
     lines: tuple[tuple[str, int], ...]
 
+    def __hash__(self) -> int:
+        # Asked once an object of a scene; a text remembers its own.
+        return hash(self.text)
+
     def place(self, line: int) -> str:
         """`file:line` of a line of the text, counted from 1."""
         file, number = self.lines[min(max(line, 1), len(self.lines)) - 1]
@@ -319,6 +323,8 @@ FALLOFFS = {"1/r": "inverse", "1/r^2": "inverse_square"}
 def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
     """Everything up to `vec3 radiance(float side)`: what the surface shows to the viewer, linear."""
     text = at.declarations
+    if plan.shows != "light":
+        return text + _shown(plan, at)
     struct = BRDFS.class_name(plan.brdf)
     ambient, shine = "vec3(0.0)", ""
     if plan.ambient == "constant":
@@ -343,9 +349,28 @@ def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
     text += f"\nvec3 radiance(float side) {{\n{shine}    Frame f = frame(side);\n"
     text += f"    vec3 p = {position};\n    vec3 v = above_horizon(viewer(p), f.n);\n    vec3 c = {ambient};\n"
     text += "".join(map(_loop, plan.lights)) + "    return c;\n}\n"
-    if plan.rate == "flat" and plan.both_sides:
-        text += f"\nbool faces_viewer() {{\n    return dot({at.normal}, viewer({position})) >= 0.0;\n}}\n"
-    return text
+    return text + _faces_viewer(plan, at)
+
+
+def _faces_viewer(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
+    """`bool faces_viewer()`, which a face asks that is seen from both sides."""
+    if plan.rate != "flat" or not plan.both_sides:
+        return ""
+    position = at.position if plan.positions else "vec3(0.0)"
+    return f"\nbool faces_viewer() {{\n    return dot({at.normal}, viewer({position})) >= 0.0;\n}}\n"
+
+
+def _shown(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
+    """`vec3 radiance(float side)` of what is shown in place of light."""
+    text = ""
+    if plan.shows == "normal":
+        text = _frame(plan, at) + f'#include "viewer/{plan.viewer}.glsl"\n' * (plan.rate == "flat" and plan.both_sides)
+        value = "frame(side).n"
+    elif plan.shows == "uv":
+        value = f"vec3({at.uv}, 0.0)"
+    else:
+        text, value = "uniform vec3 u_viewer;\nuniform float u_number;\n", f"vec3(-dot(u_viewer, {at.position}), u_number, 0.0)"
+    return text + f"\nvec3 radiance(float side) {{\n    return {value};\n}}\n" + _faces_viewer(plan, at)
 
 
 def _alpha_inputs(plan: ProgramPlan, direction: str) -> str:

@@ -155,6 +155,7 @@ class Candidates:
     """Everything that the reference has to say of a scene: what `judge` wants, and who the candidates are.
 
     fragments, bounds: of Expected's candidates as long as `base` says; base (N,): -1 is the background behind blended layers.
+    Fragments number the whole picture's pixels, everything else the crop's.
     """
 
     inputs: Inputs
@@ -198,11 +199,15 @@ def candidates(scene: Scene, *, shading: Rate | None = None, driver: Driver = LL
         classes[sure] = np.where(classes[sure] == PixelClass.BACKGROUND, PixelClass.INTERIOR, classes[sure])
         classes[uncertain] = PixelClass.SILHOUETTE
         open_[sure] = False
-    expected = Expected(inputs.size, inputs.background, classes, open_, pixel, low, high, centre)
     picture = np.broadcast_to(inputs.background, (width * height, 4)).copy()
     first = np.flatnonzero(np.append(True, pixel[1:] != pixel[:-1])) if len(pixel) else np.empty(0, dtype=np.intp)
     picture[pixel[first]] = centre[first]
-    return Candidates(inputs, expected, solid.fragments, found, base, picture.reshape(height, width, 4))
+    wanted = inputs.wanted.reshape(-1)
+    size = inputs.window[2:]
+    expected = Expected(
+        size, inputs.background, classes[wanted], open_[wanted], np.searchsorted(wanted, pixel), low, high, centre
+    )
+    return Candidates(inputs, expected, solid.fragments, found, base, picture[inputs.wanted])
 
 
 def surfaces(scene: Scene, *, driver: Driver = LLVMPIPE) -> tuple[NDArray[np.intp], Flags]:
@@ -219,7 +224,7 @@ def surfaces(scene: Scene, *, driver: Driver = LLVMPIPE) -> tuple[NDArray[np.int
     # Not seams: where two faces of a cube meet, either may be drawn.
     certain = np.isin(classes, (PixelClass.BACKGROUND, PixelClass.INTERIOR))
     certain[layers.fragments.pixel[layers.partial]] = False
-    return found.reshape(height, width), certain.reshape(height, width)
+    return found[inputs.wanted], certain[inputs.wanted]
 
 
 def _classified(inputs: Inputs, driver: Driver) -> tuple[_Pieces, _Pieces, Array, Flags, Array]:
@@ -269,7 +274,7 @@ def verify(
 
 def single_sample(scene: Scene) -> Scene:
     """The scene with one sample a pixel, kept in float32: what the reference speaks of."""
-    film = scene.film.model_copy(update={"samples": 1})
+    film = scene.film.model_copy(update={"samples": 1, "supersample": 1})
     return scene.model_copy(update={"film": film, "quality": scene.quality.model_copy(update={"storage": None})})
 
 
@@ -314,7 +319,7 @@ def verdict_of(
 
 
 def _map(expected: Candidates) -> Array:
-    width, height = expected.inputs.size
+    width, height = expected.expected.size
     return expected.expected.classes.reshape(height, width)
 
 
@@ -439,7 +444,7 @@ def _compose(
 
 def _worst(picture: Array, expected: Candidates, comparison: Comparison) -> list[Pixel]:
     """The unexplained pixels that are farthest off; after them those that use most of what is allowed."""
-    width, _ = expected.inputs.size
+    width, _ = expected.expected.size
     excess, used = comparison.excess.reshape(-1), comparison.used.reshape(-1)
     number = min(WORST, len(excess))
     key = np.where(excess > 0, 1e300, used) if not excess.any() else np.where(excess > 0, 10 + excess, 0) + np.minimum(used, 1)
@@ -503,8 +508,12 @@ def _hidden(expected: Candidates, pixels: list[int]) -> dict[int, tuple[Array, A
     if not pixels:
         return {}
     inputs = expected.inputs
-    parts = (part.take(np.isin(part.pixel, pixels)) for part in reference.rasterise(inputs, MARGIN))
+    numbers = inputs.wanted.reshape(-1)[pixels]
+    parts = (part.take(np.isin(part.pixel, numbers)) for part in reference.rasterise(inputs, MARGIN))
     fragments = Fragments.joined(parts)
     found = reference.bounds(inputs, fragments)
     low, high = found.interval(min(1.0, float(np.abs(found.value).max(initial=0.0))))
-    return {pixel: (low[fragments.pixel == pixel], high[fragments.pixel == pixel]) for pixel in pixels}
+    return {
+        pixel: (low[fragments.pixel == number], high[fragments.pixel == number])
+        for pixel, number in zip(pixels, numbers, strict=True)
+    }

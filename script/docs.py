@@ -61,6 +61,8 @@ NAMED = {
     ("Object", "quality"): "[quality](#quality)",
     ("Track", "values"): "list of numbers, or of lists of numbers",
     ("Film", "background"): "3 or 4 numbers",
+    ("Film", "crop"): "4 integers",
+    ("Film", "ocio"): "file, or `ocio://NAME`",
 }
 TABLES = {
     "Texture": "[texture](#textures)",

@@ -141,6 +141,29 @@ class Brdf(Document):
         """The model with h in place of the mirror direction, where it has that: an approximation (lecture slide 20)."""
         return self
 
+    def specular_part(self) -> "Brdf | None":
+        """The material whose f is this one's without its diffuse lobes; None where it has no others.
+
+        What it reflects of ambient light counts as diffuse.
+        """
+        return None
+
+    @classmethod
+    @cache
+    def base(cls) -> str | None:
+        """The parameter that is the surface's own colour."""
+        return next((name for name, declared in cls.parameters().items() if declared.base), None)
+
+    def without_base(self) -> "Brdf":
+        """The material with its own colour black: its specular part, where that colour is the diffuse lobe's alone."""
+        name = self.base()
+        if name is None:
+            return self
+        value, black = getattr(self, name), (0.0, 0.0, 0.0)
+        # What is cut out or let through stays so: a texture keeps its alpha.
+        keeps = isinstance(value, Texture) and self.alpha_mode != "opaque"
+        return self.model_copy(update={name: value.model_copy(update={"factor": black}) if keeps else black})
+
     def slots(self) -> dict[str, str]:
         """GLSL for the places that the model's file names in angle brackets. What this material does not need is not in it."""
         return {}

@@ -26,6 +26,9 @@ class AshikhminShirley(Brdf):
     pu: Scalar = parameter(100.0, Parameter("narrowness of the lobe along the tangent", high=1e8, usual=(1.0, 10000.0)))
     pv: Scalar = parameter(100.0, Parameter("narrowness of the lobe along the bitangent", high=1e8, usual=(1.0, 10000.0)))
 
+    def specular_part(self) -> Brdf:
+        return self.without_base()
+
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         h, length2 = half_vector(l, v)

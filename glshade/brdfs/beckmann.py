@@ -48,6 +48,9 @@ class Beckmann(Brdf):
     def asked(self, by: Literal["light", "ambient"]) -> frozenset[str]:
         return super().asked(by) - ({"kd"} if by == "light" and self.kd == (0.0, 0.0, 0.0) else set())
 
+    def specular_part(self) -> Brdf:
+        return self.without_base()
+
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         h, length2 = half_vector(l, v)

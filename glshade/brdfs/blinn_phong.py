@@ -37,6 +37,9 @@ class BlinnPhong(Brdf):
     def canonical(self, ambient: bool) -> Brdf:
         return without_lobe(self, ambient)
 
+    def specular_part(self) -> Brdf:
+        return self.without_base()
+
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         h, length2 = half_vector(l, v)

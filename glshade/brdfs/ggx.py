@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from glshade.brdfs import Array, Brdf, Colour, Law, Limit, Parameter, Scalar, above_horizon, parameter
+from glshade.brdfs import Array, Brdf, Colour, Law, Limit, Parameter, Scalar, above_horizon, choice, parameter
 from glshade.brdfs.blinn_phong import half_vector
 from glshade.brdfs.metal import Metal, brushed, cos_half, ggx_slot
 from glshade.fresnel import f_schlick, t_schlick
@@ -34,6 +34,7 @@ class Ggx(Brdf):
     metallic: Scalar = parameter(0.0, Parameter("from dielectric (0) to metal (1)", high=1.0))
     roughness: Scalar = parameter(0.5, Parameter("square root of the width of the lobe, alpha", high=1.0, usual=(0.1, 1.0)))
     anisotropy: Scalar = parameter(0.0, Parameter("how much longer highlights are along the tangent", high=1.0))
+    lobes: Literal["all", "specular"] = choice("all", "specular: without diffuse light")
 
     @classmethod
     def limits(cls) -> tuple[Limit, ...]:
@@ -50,12 +51,15 @@ class Ggx(Brdf):
         return brushed(self.anisotropy)
 
     def slots(self) -> dict[str, str]:
-        dark = self.metallic == 1 or self.kd == (0.0, 0.0, 0.0)
+        dark = self.lobes == "specular" or self.metallic == 1 or self.kd == (0.0, 0.0, 0.0)
         diffuse = "none" if dark else "beside_schlick"
         return {"ggx": ggx_slot(self.anisotropy), "diffuse": f'#include "microfacet/diffuse_{diffuse}.glsl"\n'}
 
     def asked(self, by: Literal["light", "ambient"]) -> frozenset[str]:
         return super().asked(by) - ({"anisotropy"} if not self.needs_tangents else set())
+
+    def specular_part(self) -> Brdf:
+        return self.model_copy(update={"lobes": "specular"})
 
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
@@ -64,8 +68,10 @@ class Ggx(Brdf):
         metallic = np.asarray(m.metallic)[..., None]
         f0 = m.f0 * (1 - metallic) + m.kd * metallic
         lobe = np.where(length2 > 1e-12, ggx_cos(l, v, h, m.roughness, m.anisotropy), 0.0)
-        diffuse = m.kd * (1 - metallic) / math.pi * t_schlick(1 - f0, LoH) * l[..., 2:]
-        return above_horizon(l, v, diffuse + f_schlick(f0, LoH) * lobe[..., None])
+        value = f_schlick(f0, LoH) * lobe[..., None]
+        if m.lobes == "all":
+            value = value + m.kd * (1 - metallic) / math.pi * t_schlick(1 - f0, LoH) * l[..., 2:]
+        return above_horizon(l, v, value)
 
     @staticmethod
     def ambient_reflectance(m: Any) -> Array:

@@ -118,6 +118,9 @@ class Lafortune(Brdf):
             "lobes": f"vec3 lobes(Lafortune m, Axes x) {{\n    vec3 sum = vec3(0.0);\n{body}    return sum;\n}}\n",
         }
 
+    def specular_part(self) -> Brdf:
+        return self.without_base()
+
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         total = m.kd / math.pi

@@ -41,6 +41,9 @@ class Metal(Brdf):
     def asked(self, by: Literal["light", "ambient"]) -> frozenset[str]:
         return super().asked(by) - ({"anisotropy"} if not self.needs_tangents else set())
 
+    def specular_part(self) -> Brdf:
+        return self
+
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         h, length2 = half_vector(l, v)

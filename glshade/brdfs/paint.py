@@ -77,6 +77,9 @@ class Paint(Brdf):
         lobes = self._lobes()
         return super().asked(by) - {name for lobe, names in needs.items() if lobe not in lobes for name in names}
 
+    def specular_part(self) -> Brdf:
+        return self.without_base()
+
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         h, length2 = half_vector(l, v)

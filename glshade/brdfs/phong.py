@@ -40,6 +40,9 @@ class Phong(Brdf):
     def half_angle(self) -> Brdf:
         return with_half_angle(self, "blinn_phong")
 
+    def specular_part(self) -> Brdf:
+        return self.without_base()
+
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         # In the local frame the mirror direction is l turned half round the normal.

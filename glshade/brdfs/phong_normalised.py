@@ -35,6 +35,9 @@ class PhongNormalised(Brdf):
     def half_angle(self) -> Brdf:
         return with_half_angle(self, "blinn_phong_normalised")
 
+    def specular_part(self) -> Brdf:
+        return self.without_base()
+
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         # In the local frame the mirror direction is l turned half round the normal.

@@ -50,6 +50,9 @@ class Plastic(Brdf):
     def slots(self) -> dict[str, str]:
         return {"interface": f'#include "lobe/interface_{self.fresnel}.glsl"\n'}
 
+    def specular_part(self) -> Brdf:
+        return self.without_base()
+
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         h, length2 = half_vector(l, v)

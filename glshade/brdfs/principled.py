@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from glshade.brdfs import Array, Brdf, Colour, Law, Limit, Parameter, Scalar, above_horizon, parameter
+from glshade.brdfs import Array, Brdf, Colour, Law, Limit, Parameter, Scalar, above_horizon, choice, parameter
 from glshade.brdfs.blinn_phong import half_vector
 from glshade.brdfs.burley import burley
 
@@ -40,6 +40,7 @@ class Principled(Brdf):
     sheen_tint: Scalar = parameter(0.5, Parameter("how much of the base colour's hue the sheen has", high=1.0))
     clearcoat: Scalar = parameter(0.0, Parameter("strength of the second highlight", high=1.0))
     clearcoat_gloss: Scalar = parameter(1.0, Parameter("0: satin, 1: gloss", high=1.0))
+    lobes: Literal["all", "specular"] = choice("all", "specular: without diffuse light and sheen")
 
     @classmethod
     def limits(cls) -> tuple[Limit, ...]:
@@ -65,11 +66,12 @@ class Principled(Brdf):
     def _parts(self) -> set[str]:
         """What is in the program; a texture is never nothing, nor all."""
         base = self.metallic != 1.0
+        below = base and self.lobes == "all"
         parts = {
-            "burley": base and self.subsurface != 1.0,
-            "flat_subsurface": base and self.subsurface != 0.0,
-            "sheen": base and self.sheen != 0.0,
-            "sheen_tint": base and self.sheen != 0.0 and self.sheen_tint != 0.0,
+            "burley": below and self.subsurface != 1.0,
+            "flat_subsurface": below and self.subsurface != 0.0,
+            "sheen": below and self.sheen != 0.0,
+            "sheen_tint": below and self.sheen != 0.0 and self.sheen_tint != 0.0,
             "specular": base,
             "specular_tint": base and self.specular != 0.0 and self.specular_tint != 0.0,
             "metal": self.metallic != 0.0,
@@ -106,6 +108,7 @@ class Principled(Brdf):
     def asked(self, by: Literal["light", "ambient"]) -> frozenset[str]:
         parts = self._parts()
         kept = {
+            "kd": by == "ambient" or bool(parts & {"burley", "flat_subsurface", "specular_tint", "metal"}),
             "metallic": parts >= {"metal", "specular"},
             "subsurface": parts >= {"burley", "flat_subsurface"},
             "specular": "specular" in parts,
@@ -117,6 +120,9 @@ class Principled(Brdf):
             "clearcoat_gloss": "clearcoat" in parts,
         }
         return super().asked(by) - {name for name, keep in kept.items() if not keep}
+
+    def specular_part(self) -> Brdf:
+        return self.model_copy(update={"lobes": "specular"})
 
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
@@ -137,8 +143,9 @@ class Principled(Brdf):
         highlight = highlight * _shadowed(NoL, NoV, (0.5 + m.roughness / 2) ** 2)
         coat = np.where(facet, gtr1(h, _mix(0.1, 0.001, m.clearcoat_gloss)), 0.0) * NoL
         coat = 0.25 * m.clearcoat * coat * _shadowed(NoL, NoV, 0.25) * _mix(0.04, 1.0, fh)
-        value = (1 - metallic) * (m.kd * diffuse[..., None] + sheen)
-        value = value + _mix(f0, 1.0, fh[..., None]) * highlight[..., None] + coat[..., None]
+        value = _mix(f0, 1.0, fh[..., None]) * highlight[..., None] + coat[..., None]
+        if m.lobes == "all":
+            value = value + (1 - metallic) * (m.kd * diffuse[..., None] + sheen)
         return above_horizon(l, v, value)
 
     @staticmethod

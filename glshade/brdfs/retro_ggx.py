@@ -34,6 +34,9 @@ class RetroGgx(Brdf):
     def asked(self, by: Literal["light", "ambient"]) -> frozenset[str]:
         return super().asked(by) - ({"kd"} if by == "light" and self.kd == (0.0, 0.0, 0.0) else set())
 
+    def specular_part(self) -> Brdf:
+        return self.without_base()
+
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         r = l * np.array([-1.0, -1.0, 1.0])

@@ -30,6 +30,9 @@ class RetroPhong(Brdf):
     def canonical(self, ambient: bool) -> Brdf:
         return without_lobe(self, ambient)
 
+    def specular_part(self) -> Brdf:
+        return self.without_base()
+
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         lobe = (m.exponent + 2) / (2 * math.pi) * power_of_cosine(l, v, m.exponent)

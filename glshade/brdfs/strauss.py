@@ -5,7 +5,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from glshade.brdfs import Array, Brdf, Colour, Law, Parameter, Scalar, above_horizon, parameter
+from glshade.brdfs import Array, Brdf, Colour, Law, Parameter, Scalar, above_horizon, choice, parameter
 from glshade.brdfs.phong import power_of_cosine
 
 # Strauss's constants: of the Fresnel term, of the geometric one, and what grazing light adds to the reflectivity.
@@ -34,12 +34,20 @@ class Strauss(Brdf):
     )
     smoothness: Scalar = parameter(0.6, Parameter("from dull to a mirror's small highlights", high=1.0, usual=(0.0, 0.95)))
     metalness: Scalar = parameter(0.5, Parameter("how far highlights have the surface's colour", high=1.0))
+    lobes: Literal["all", "specular"] = choice("all", "specular: without diffuse light")
+
+    def specular_part(self) -> Brdf:
+        return self.model_copy(update={"lobes": "specular"})
+
+    def slots(self) -> dict[str, str]:
+        diffuse = "diffuse" if self.lobes == "all" else "dark"
+        return {"diffuse": f'#include "lobe/strauss_{diffuse}.glsl"\n'}
 
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         s, metal = m.smoothness, m.metalness
         smooth = s**3
-        diffuse = l[..., 2] * (1 - metal * s) * (1 - s) * (1 + s + s * s)
+        diffuse = l[..., 2] * (1 - metal * s) * (1 - s) * (1 + s + s * s) if m.lobes == "all" else np.zeros_like(l[..., 2])
         (a, height), (_, height_v) = elevation(l), elevation(v)
         f = a * (height + 2 * KF - 1) / (height + KF - 1) ** 2 * ((KF - 1) ** 2 / (2 * KF - 1))
         reflectivity = np.minimum(smooth + (smooth + KJ) * f * geometry(height) * geometry(height_v), 1)

@@ -53,6 +53,9 @@ class Gaussian(Brdf):
     def slots(self) -> dict[str, str]:
         return {"across": f'#include "lib/across_{"anisotropic" if self.needs_tangents else "isotropic"}.glsl"\n'}
 
+    def specular_part(self) -> Brdf:
+        return self.without_base()
+
     @staticmethod
     def ambient_reflectance(m: Any) -> Array:
         return m.kd  # type: ignore[no-any-return]

@@ -40,7 +40,7 @@ def _figure(x: float) -> float:
 
 def on_cpu(context: Context) -> bool:
     """Whether the driver draws with this process' own threads."""
-    return any(name in context.renderer for name in ("llvmpipe", "softpipe", "SwiftShader"))
+    return context.is_software
 
 
 def seconds(context: Context, draw: Callable[[], None]) -> float:

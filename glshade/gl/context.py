@@ -88,6 +88,16 @@ class Context:
         return str(self._info["GL_VERSION"])
 
     @property
+    def is_software(self) -> bool:
+        """Whether the driver draws with this process' own threads."""
+        return any(name in self.renderer for name in ("llvmpipe", "softpipe", "SwiftShader"))
+
+    @property
+    def passed_vectors(self) -> int:
+        """How many vectors go from the vertex to the fragment stage; OpenGL 3.3 promises 15."""
+        return int(self._info.get("GL_MAX_VARYING_VECTORS", 15))
+
+    @property
     def largest_side(self) -> int:
         """The largest picture that the driver draws in one piece [pixels]."""
         info = self._info

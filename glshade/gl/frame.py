@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from glshade.gl.context import Context
 
 GL_RENDERBUFFER, GL_DEPTH_COMPONENT32F = 0x8D41, 0x8CAC
+# x, y, width, height [pixels], from the top left.
+Box = tuple[int, int, int, int]
 Storage = Literal["rgba8", "rgb10_a2", "r11f_g11f_b10f", "rgba16f", "rgba32f"]
 # Internal formats (Khronos' registry, gl.xml) and their channels.
 FORMATS: dict[Storage, tuple[int, int]] = {
@@ -46,10 +48,17 @@ class Frame:
         if self._colour is not None:
             _store(context, self._colour.glo, format_, size, several)
         self.target = self._resolved if self._colour is None else gl.framebuffer([self._colour], self._depth)
+        self.part: Box | None = None
         self._gl = gl
 
-    def begin(self, background: tuple[float, float, float, float]) -> None:
-        """Binds it, with every pixel at the background (4 numbers) and as far away as can be (reversed depth: 0)."""
+    def begin(self, background: tuple[float, float, float, float], part: Box | None = None) -> None:
+        """Binds it, with every pixel at the background (4 numbers) and as far away as can be (reversed depth: 0).
+
+        part: all that is drawn, to the same bits as when the whole is: a scissor's place has no side effects (OpenGL 4.6 core,
+        A.3, rule 2).
+        """
+        self.part = part
+        self.target.scissor = part  # type: ignore[assignment]
         self.target.use()
         self.target.clear(*background, depth=0.0)
 
@@ -59,10 +68,12 @@ class Frame:
             self._gl.copy_framebuffer(self._resolved, self.target)
         return self.texture
 
-    def readback(self, out: NDArray[Any]) -> None:
-        """Fills out (H, W, 4), uint8 or float32 and contiguous, row 0 at the top."""
+    def readback(self, out: NDArray[Any], corner: tuple[int, int] = (0, 0)) -> None:
+        """Fills out (H, W, 4), uint8 or float32 and contiguous, row 0 at the top, with what lies at the corner."""
         self.resolve()
-        self._resolved.read_into(out, components=4, alignment=1, dtype="f1" if out.dtype == np.uint8 else "f4")
+        height, width, _ = out.shape
+        dtype = "f1" if out.dtype == np.uint8 else "f4"
+        self._resolved.read_into(out, (*corner, width, height), components=4, alignment=1, dtype=dtype)
 
 
 def _store(context: Context, renderbuffer: int, format_: int, size: tuple[int, int], samples: int) -> None:

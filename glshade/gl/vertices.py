@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 from weakref import WeakKeyDictionary
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
 
 from glshade.gl.context import Context
 from glshade.gl.program import Program
@@ -31,16 +31,21 @@ class Vertices:
     def __init__(self, context: Context) -> None:
         self._context = context
         self._buffers: WeakKeyDictionary[Mesh, dict[tuple[str, ...], moderngl.Buffer]] = WeakKeyDictionary()
+        self._arrays: WeakKeyDictionary[Mesh, dict[Program, moderngl.VertexArray]] = WeakKeyDictionary()
 
-    def array(self, mesh: Mesh, program: Program, order: np.ndarray[Any, Any] | None = None) -> moderngl.VertexArray:
-        """The mesh, ready to be drawn by the program. order: the triangles to draw, by number; None: all."""
+    def array(self, mesh: Mesh, program: Program, triangles: NDArray[np.uint32] | None = None) -> moderngl.VertexArray:
+        """The mesh, ready to be drawn by the program. triangles: (N, 3), those to draw; None: all."""
+        if triangles is not None:
+            return self._array(mesh, program, self._context.gl.buffer(triangles.data))
+        kept = self._arrays.setdefault(mesh, {})
+        if program not in kept:
+            kept[program] = self._array(mesh, program, self._buffer(mesh, (), mesh.triangles.tobytes))
+        return kept[program]
+
+    def _array(self, mesh: Mesh, program: Program, indices: moderngl.Buffer) -> moderngl.VertexArray:
         names = tuple(name for name in program.attributes if name in ATTRIBUTES)
         sizes = [ATTRIBUTES[name][1] for name in names]
         buffer = self._buffer(mesh, names, lambda: _interleaved(mesh, names))
-        if order is None:
-            indices = self._buffer(mesh, (), mesh.triangles.tobytes)
-        else:
-            indices = self._context.gl.buffer(mesh.triangles[order].tobytes())
         layout = " ".join(f"{size}f" for size in sizes)
         return self._context.gl.vertex_array(program.gl, [(buffer, layout, *names)], indices)
 

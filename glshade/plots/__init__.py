@@ -14,7 +14,7 @@ import numpy as np
 
 from glshade.atomic import replacing
 from glshade.brdfs import Brdf
-from glshade.errors import GlshadeError
+from glshade.errors import GlshadeError, MissingLibrary
 from glshade.lobe import Quantity
 
 if TYPE_CHECKING:
@@ -32,12 +32,6 @@ Scale = Literal["auto", "linear", "log"]
 SUFFIXES = (".pdf", ".png", ".svg")
 ANGLES = tuple(float(angle) for angle in np.radians((0.0, 30.0, 60.0, 80.0)))
 INCIDENCE = float(np.radians(45.0))
-
-
-class MissingLibrary(GlshadeError):
-    """matplotlib is not installed."""
-
-    exit_code = 2
 
 
 def check() -> None:

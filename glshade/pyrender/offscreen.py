@@ -6,20 +6,16 @@ import contextlib
 import warnings
 from collections.abc import Mapping
 from enum import IntFlag
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from glshade.errors import GlshadeError, SceneError
+from glshade.mesh_file import AssetWarning
 
 if TYPE_CHECKING:
-    from glshade.scene import Scene
-
-Bytes = NDArray[np.uint8]
-Floats = NDArray[np.float32]
-# pyrender's shader encodes with a power; its samples are averaged after that.
-GAMMA = 2.2
+    from glshade.pyrender.painter import Painter
+    from glshade.pyrender.scene import Converted
 
 
 class RenderFlags(IntFlag):
@@ -43,15 +39,14 @@ class RenderFlags(IntFlag):
     SEG = 8192
 
 
-# What is drawn with lines.
-LINES = RenderFlags.FLIP_WIREFRAME | RenderFlags.ALL_WIREFRAME | RenderFlags.VERTEX_NORMALS | RenderFlags.FACE_NORMALS
+# Drawn by pyrender's viewer alone: what it reads back of an offscreen picture has none.
+NORMALS = RenderFlags.VERTEX_NORMALS | RenderFlags.FACE_NORMALS
+# What nothing lies behind.
+NOTHING = (0.0, 0.0, 0.0, 1.0)
 
 
 class OffscreenRenderer:
-    """pyrender.OffscreenRenderer's signature. backend, device: as of glshade.Renderer. Errors: ContextError.
-
-    point_size is kept, and points are not drawn.
-    """
+    """pyrender.OffscreenRenderer's signature. backend, device: as of glshade.Renderer. Errors: ContextError."""
 
     def __init__(
         self,
@@ -63,11 +58,14 @@ class OffscreenRenderer:
         device: int | None = None,
     ) -> None:
         from glshade.gl.renderer import Renderer
+        from glshade.pyrender.painter import Painter
+        from glshade.pyrender.scene import Conversion
 
         self.viewport_width = viewport_width
         self.viewport_height = viewport_height
         self.point_size = point_size
-        self._renderer: Renderer | None = Renderer(backend, device)
+        self._painter: Painter | None = Painter(Renderer(backend, device))
+        self._conversion = Conversion()
         self._said: set[str] = set()
 
     @property
@@ -100,89 +98,79 @@ class OffscreenRenderer:
     def render(self, scene: Any, flags: int = RenderFlags.NONE, seg_node_map: Mapping[Any, Any] | None = None) -> Any:
         """(colour (H, W, 3) uint8, with RGBA (H, W, 4); depth (H, W) float32), with DEPTH_ONLY the depth alone.
 
-        depth: along the view axis at the middle of the pixel [scene units], 0 where nothing is. seg_node_map: node -> colour,
-        three numbers or one; with SEG, what is drawn and how. Errors: SceneError, GlshadeError where a flag asks for lines.
+        depth: along the view axis [scene units], 0 where nothing is: of the pixel's first sample, with SEG at its middle, as
+        in pyrender. seg_node_map: node -> colour, three numbers or one; with SEG, what is drawn and how.
+        Errors: SceneError.
         """
-        from glshade.pyrender.scene import converted, main_camera
-        from glshade.scene import Film, Scene
+        from glshade.pyrender.canvas import SAMPLES
+        from glshade.pyrender.scene import AS_THEY_ARE, Look, lights, main_camera, screen
 
-        if self._renderer is None:
+        if self._painter is None:
             raise GlshadeError("this OffscreenRenderer was deleted; make another")
         wanted = RenderFlags(int(flags))
-        if wanted & LINES:
-            names = ", ".join(str(flag.name) for flag in RenderFlags if flag & LINES & wanted)
-            raise GlshadeError(f"{names}: glshade draws no lines; leave it out")
-        if wanted & RenderFlags.SHADOWS_ALL:
+        depth_only, segmented = RenderFlags.DEPTH_ONLY in wanted, RenderFlags.SEG in wanted
+        if wanted & RenderFlags.SHADOWS_ALL and not (depth_only or segmented):
             self._say("shadows are not local shading; they are left out")
+        if wanted & NORMALS:
+            self._say("normals are drawn by pyrender's viewer alone; they are left out, as in its offscreen pictures")
         size = (self.viewport_width, self.viewport_height)
         seen_from = main_camera(scene, size)
         if seen_from is None:
             raise SceneError("the scene has no camera")
-        colours = (seg_node_map or {}) if wanted & RenderFlags.SEG else None
-        nodes = scene.mesh_nodes if colours is None else [node for node in scene.mesh_nodes if node in colours]
-        flat = bool(wanted & RenderFlags.FLAT) or colours is not None or bool(wanted & RenderFlags.DEPTH_ONLY)
-        objects, of = converted(scene, nodes, flat, bool(wanted & RenderFlags.SKIP_CULL_FACES))
-        film = Film(size=size, samples=4, background=(0.0, 0.0, 0.0, 0.0))
-        depth, number = np.zeros(size[::-1], dtype=np.float32), np.full(size[::-1], -1, dtype=np.int32)
-        drawn = None
-        if objects:
-            drawn = Scene(objects=tuple(objects), lights=self._lights(scene, flat), camera=seen_from, film=film)
-            depth, number = self._renderer.surfaces(drawn)
-        if wanted & RenderFlags.DEPTH_ONLY:
-            return depth
-        if colours is not None:
-            picture = segments(number, [colours[node] for node in of])
-        else:
-            picture = self._picture(drawn, np.asarray(scene.bg_color, dtype=np.float32), flat)
-        return (picture if wanted & RenderFlags.RGBA else np.ascontiguousarray(picture[..., :3])), depth
-
-    def _lights(self, scene: Any, flat: bool) -> tuple[Any, ...]:
-        from glshade.lights import LIGHTS
-        from glshade.pyrender.scene import lights
-
-        return (LIGHTS["ambient"](type="ambient"),) if flat else lights(scene)
-
-    def _picture(self, scene: Scene | None, background: Floats, flat: bool) -> Bytes:
-        """(H, W, 4). As in pyrender, what covers a part of a pixel is mixed with the background after encoding."""
-        assert self._renderer is not None
-        if scene is None:
-            pixels = np.zeros((self.viewport_height, self.viewport_width, 4), dtype=np.float32)
-        else:
-            pixels = self._renderer.render(scene, dtype="float32").pixels
-        cover = pixels[..., 3:]
-        colour = np.divide(pixels[..., :3], cover, out=np.zeros_like(pixels[..., :3]), where=cover > 0)
-        colour = np.clip(colour, 0, 1)
-        if not flat:
-            colour **= 1 / GAMMA
-        result = background * (1 - cover)
-        result[..., :3] += colour * cover
-        result[..., 3:] += cover
-        picture: Bytes = np.rint(np.clip(result, 0, 1) * 255).astype(np.uint8)
-        return picture
+        nodes, colours = scene.mesh_nodes, {}
+        if segmented:
+            colours = {node: colour_of(given) for node, given in (seg_node_map or {}).items()}
+            nodes = [node for node in nodes if node in colours]
+        plain = not (depth_only or segmented)
+        kind: Literal["lit", "flat", "silhouette"] = "silhouette"
+        if plain:
+            kind = "flat" if RenderFlags.FLAT in wanted else "lit"
+        look = Look(kind, RenderFlags.SKIP_CULL_FACES in wanted, colours)
+        found = self._conversion.convert(scene, nodes, look, lambda: screen(seen_from, size, self.point_size))
+        for note in found.notes:
+            self._say(note)
+        with self._painter.renderer.context.gl as gl:
+            gl.gc()
+            canvas = self._painter.canvas(size, 1 if segmented else SAMPLES, not depth_only)
+            canvas.begin(tuple(float(c) for c in scene.bg_color) if plain else NOTHING)
+            depth = np.zeros(size[::-1], dtype=np.float32)
+            if found.objects:
+                wires = _wires(found, wanted) if plain else set()
+                shining = lights(scene) if kind == "lit" else AS_THEY_ARE
+                encoding: Literal["power", "linear"] = "power" if kind == "lit" else "linear"
+                seen = self._painter.paint(found.objects, wires, shining, seen_from, canvas, encoding)
+                canvas.resolve()
+                depth = canvas.depth(*seen)
+            else:
+                canvas.resolve()
+            return depth if depth_only else (canvas.colour(4 if RenderFlags.RGBA in wanted else 3), depth)
 
     def _say(self, message: str) -> None:
         """Warns once."""
         if message not in self._said:
             self._said.add(message)
-            warnings.warn(message, UserWarning, stacklevel=3)
+            warnings.warn(f"pyrender: {message}", AssetWarning, stacklevel=3)
 
     def delete(self) -> None:
         """Gives everything back to the driver. Twice is once."""
-        renderer, self._renderer = self._renderer, None
-        if renderer is not None:
-            renderer.release()
+        painter, self._painter = self._painter, None
+        if painter is not None:
+            painter.renderer.release()
 
     def __del__(self) -> None:
         with contextlib.suppress(Exception):
             self.delete()
 
 
-def segments(number: NDArray[np.int32], colours: list[Any]) -> Bytes:
-    """(H, W, 4): the colour of each pixel's object, black where nothing is."""
-    palette = np.zeros((len(colours) + 1, 4), dtype=np.uint8)
-    palette[:, 3] = 255
-    for index, colour in enumerate(colours):
-        palette[index, :3] = np.clip(np.rint(np.ravel(colour)[:3]), 0, 255)
-    # -1, where nothing is, finds the last.
-    picture: Bytes = palette[number]
-    return picture
+def _wires(found: Converted, wanted: RenderFlags) -> set[int]:
+    """The numbers of the objects that are drawn as wireframes."""
+    everything = set(range(len(found.objects)))
+    if RenderFlags.ALL_WIREFRAME in wanted:
+        return everything
+    return everything - found.wires if RenderFlags.FLIP_WIREFRAME in wanted else found.wires
+
+
+def colour_of(given: Any) -> tuple[float, float, float]:
+    """Of what stands in a seg_node_map: three numbers up to 255, or one for all three."""
+    r, g, b = (float(c) for c in np.clip(np.broadcast_to(np.ravel(given)[:3], 3) / 255, 0, 1))
+    return r, g, b

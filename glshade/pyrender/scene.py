@@ -4,54 +4,55 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Iterable, Iterator
-from pathlib import Path
-from typing import Any
-from urllib.parse import quote
-from weakref import WeakKeyDictionary
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError
 
-from glshade.brdfs import BRDFS, Brdf
+from glshade.brdfs import Brdf
 from glshade.camera import Perspective, is_singular
 from glshade.errors import SceneError
-from glshade.formats import gltf_material
-from glshade.formats.file import File
 from glshade.lights import LIGHTS, Light
 from glshade.mesh import Mesh
 from glshade.mesh_file import AssetWarning
 from glshade.pyrender.camera import affine_rows, camera
-from glshade.pyrender.textures import picture, rgba
+from glshade.pyrender.materials import WHITE, Colour, material, silhouette
+from glshade.pyrender.meshes import Screen, arrays, is_drawn_with_strokes, mesh, strokes
 from glshade.scene import Film, Object, Scene, Transform
 from glshade.srgb import srgb_to_linear
 
 Array = NDArray[np.float64]
 
-TRIANGLES, STRIP, FAN = 4, 5, 6
-MODES = {0: "points", 1: "lines", 2: "lines", 3: "lines"}
 # pyrender has no distance below which a light grows no brighter; less than this, nothing is [m].
 R_MIN = 1e-9
+# The lights under which surfaces show their base colours.
+AS_THEY_ARE: tuple[Light, ...] = (LIGHTS["ambient"](type="ambient"),)
 
 
 def from_pyrender(scene: Any, size: tuple[int, int] = (640, 480)) -> Scene:
     """The Scene of a pyrender.Scene, for a picture of `size` (width, height), 4 samples a pixel as there.
 
     Meshes with their instances, materials, textures, lights, the main camera (without one, the scene is framed) and the
-    background. What has no counterpart is left out with an AssetWarning. Errors: SceneError, where nothing is left to draw
-    too.
+    background. Points and lines become strips a pixel wide as that camera sees them. What has no counterpart is left out with
+    an AssetWarning. Errors: SceneError, where nothing is left to draw too.
     """
-    objects, _ = converted(scene, scene.mesh_nodes)
-    if not objects:
-        raise SceneError("the scene has no visible triangles")
+    seen_from = main_camera(scene, size)
+    seen_on = None if seen_from is None else lambda: screen(seen_from, size)
+    found = Conversion().convert(scene, scene.mesh_nodes, Look(), seen_on)
+    for note in found.notes + ["wireframes are drawn solid"] * bool(found.wires):
+        warnings.warn(f"pyrender: {note}", AssetWarning, stacklevel=2)
+    if not found.objects:
+        raise SceneError("the scene has nothing to draw")
     background = np.asarray(scene.bg_color, dtype=np.float64)
     # What pyrender clears with is shown as it is.
     shown = [float(c) for c in srgb_to_linear(background[:3])] + [float(background[3])] * bool(background[3] < 1)
     return Scene(
-        objects=tuple(objects),
+        objects=tuple(found.objects),
         lights=lights(scene),
-        camera=main_camera(scene, size) or Perspective(),
+        camera=seen_from or Perspective(),
         film=Film(size=size, samples=4, background=tuple(shown)),
     )
 
@@ -62,159 +63,109 @@ def main_camera(scene: Any, size: tuple[int, int]) -> Any:
     return None if node is None else camera(node.camera, scene.get_pose(node), size)
 
 
-def converted(scene: Any, nodes: Iterable[Any], flat: bool = False, both: bool = False) -> tuple[list[Object], list[Any]]:
-    """The objects of the nodes' visible meshes, and the node of each: one for every primitive in every instance.
+def screen(seen_from: Any, size: tuple[int, int], point_size: float = 1.0) -> Screen:
+    """What points and lines need to know of a camera's picture."""
+    # Where the far plane is matters to neither.
+    return Screen(seen_from.view(np.zeros((1, 3)), size[0] / size[1]), size, point_size)
 
-    flat: base colours as they are, for ambient light of 1. both: back faces are drawn too. In pyrender's order, from far to
-    near: of surfaces at one place it is the first that is seen. Errors: SceneError.
+
+@dataclass(frozen=True)
+class Look:
+    """What is made of the materials. lit: themselves. flat: base colours as they are. silhouette: the colour of their node.
+
+    both: back faces are drawn too. colours: node -> colour, white where it says nothing.
     """
-    eye = np.zeros(3) if scene.main_camera_node is None else scene.get_pose(scene.main_camera_node)[:3, 3]
-    placed = [(node, scene.get_pose(node)) for node in nodes if node.mesh.is_visible]
-    placed.sort(key=lambda pair: (-float(np.linalg.norm(pair[1][:3, 3] - eye)), pair[0].name or "", pair[1].tobytes()))
-    objects: list[Object] = []
-    of: list[Any] = []
-    materials: dict[int, Brdf] = {}
-    for node, pose in placed:
-        for primitive in node.mesh.primitives:
-            found = mesh(primitive)
-            if found is None:
-                continue
-            if id(primitive) not in materials:
-                materials[id(primitive)] = material(primitive, flat, both)
-            instances = [pose] if primitive.poses is None else [pose @ own for own in primitive.poses.astype(np.float64)]
-            for matrix in instances:
-                # What is flattened covers no pixel.
-                if not is_singular(matrix[:3, :3]):
-                    transform = Transform.model_validate({"matrix": affine_rows(matrix)})
-                    objects.append(Object(mesh=found, transform=transform, material=materials[id(primitive)]))
-                    of.append(node)
-    return objects, of
+
+    kind: Literal["lit", "flat", "silhouette"] = "lit"
+    both: bool = False
+    colours: Mapping[Any, Colour] = field(default_factory=dict)
 
 
-# --- meshes ----------------------------------------------------------------------------------------------------------
+@dataclass(eq=False)
+class Converted:
+    """objects: one for every primitive in every instance. wires: the numbers of those drawn as wireframes. notes: what was
+    left out."""
 
-# What was made of a primitive, and the arrays that it was made of. pyrender uploads them once; a new array counts as a change.
-_meshes: WeakKeyDictionary[Any, tuple[tuple[Any, ...], Mesh]] = WeakKeyDictionary()
+    objects: list[Object]
+    wires: set[int]
+    notes: list[str]
 
-
-def mesh(primitive: Any) -> Mesh | None:
-    """The triangles of a primitive; None where it has none. Errors: AssetError."""
-    p = primitive
-    arrays = (p.positions, p.indices, p.normals, p.texcoord_0, p.color_0, p.mode)
-    known = _meshes.get(p)
-    if known is not None and all(one is other for one, other in zip(known[0], arrays, strict=True)):
-        return known[1]
-    if p.mode in MODES:
-        warnings.warn(f"{MODES[p.mode]} are not drawn, triangles alone", AssetWarning, stacklevel=2)
-        return None
-    order = np.arange(len(p.positions)) if p.indices is None else np.asarray(p.indices).reshape(-1).astype(np.int64)
-    triangles = _triangles(order, p.mode)
-    if not len(triangles):
-        return None
-    # pyrender's texture coordinates start at the bottom left too; its vertex colours are linear.
-    made = Mesh.build(p.positions, triangles, p.normals, p.texcoord_0, p.color_0)
-    _meshes[p] = arrays, made
-    return made
+    def say(self, *notes: str) -> None:
+        """Each once."""
+        self.notes.extend(note for note in notes if note not in self.notes)
 
 
-def _triangles(order: NDArray[np.int64], mode: int) -> NDArray[np.int64]:
-    """(T, 3) of the vertices in the order in which GL is given them."""
-    if mode == TRIANGLES:
-        return order[: len(order) // 3 * 3].reshape(-1, 3)
-    first = order[: max(len(order) - 2, 0)]
-    second, third = order[1 : 1 + len(first)], order[2:]
-    if mode == FAN:
-        return np.stack([np.broadcast_to(order[:1], first.shape), second, third], axis=1)
-    # Every other triangle of a strip is turned, so that all wind alike.
-    odd = np.arange(len(first)) % 2 == 1
-    return np.stack([np.where(odd, second, first), np.where(odd, first, second), third], axis=1)
+class Conversion:
+    """Makes objects of nodes; what has not changed since the last time is not made again, and is the same object."""
+
+    def __init__(self) -> None:
+        # What was made, by what it was made of; that is kept with it, so that nothing else comes to have its number.
+        self._last: dict[tuple[str, bool], dict[tuple[Any, ...], tuple[Any, Any]]] = {}
+
+    def convert(self, scene: Any, nodes: Iterable[Any], look: Look, seen_on: Callable[[], Screen] | None) -> Converted:
+        """The nodes' visible meshes in pyrender's order, from far to near: of surfaces at one place the first is seen.
+
+        seen_on: for points and lines, which are left out without. Errors: SceneError.
+        """
+        eye = np.zeros(3) if scene.main_camera_node is None else scene.get_pose(scene.main_camera_node)[:3, 3]
+        placed = [(node, scene.get_pose(node)) for node in nodes if node.mesh.is_visible]
+        placed.sort(key=lambda pair: (-float(np.linalg.norm(pair[1][:3, 3] - eye)), pair[0].name or "", pair[1].tobytes()))
+        result = Converted([], set(), [])
+        last = self._last.get((look.kind, look.both), {})
+        now: dict[tuple[Any, ...], tuple[Any, Any]] = {}
+
+        def kept(made_of: Any, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
+            now[key] = last.get(key) or now.get(key) or (made_of, make())
+            return now[key][1]
+
+        coloured = look.kind != "silhouette"
+        on: Screen | None = None
+        for node, pose in placed:
+            for primitive in node.mesh.primitives:
+                if coloured:
+                    made, notes = material(primitive, look.kind == "flat", look.both)
+                    result.say(*notes)
+                else:
+                    made = silhouette(primitive, look.colours.get(node, WHITE), look.both)
+                given = arrays(primitive)
+                for place in _instances(primitive, pose):
+                    if not is_drawn_with_strokes(primitive):
+                        shape = mesh(primitive)
+                    elif seen_on is not None:
+                        on = on or seen_on()
+                        key = (*map(id, given), place.tobytes(), on.key)
+                        shape = kept(given, key, partial(strokes, primitive, place, on))
+                        place = np.eye(4)
+                    else:
+                        shape = None
+                        result.say("points and lines are left out: they are as wide as pixels, and the scene has no camera")
+                    if shape is None:
+                        continue
+                    key = (id(shape), id(made), place.tobytes())
+                    found = kept((shape, made), key, partial(_object, shape, made, place, coloured))
+                    if found is not None:
+                        if primitive.material.wireframe and coloured:
+                            result.wires.add(len(result.objects))
+                        result.objects.append(found)
+        self._last[look.kind, look.both] = now
+        return result
 
 
-# --- materials -------------------------------------------------------------------------------------------------------
-
-
-def material(primitive: Any, flat: bool, both: bool) -> Brdf:
-    """The material of a primitive. pyrender's materials are glTF's, key by key. Errors: SceneError."""
-    given = primitive.material
-    name = given.name or ""
-    header: dict[str, list[Any]] = {"textures": [], "samplers": [], "images": []}
-
-    def texture(slot: str) -> dict[str, Any] | None:
-        """glTF's textureInfo of one of the material's textures."""
-        found = getattr(given, slot, None)
-        path = picture(found) if found is not None and primitive.texcoord_0 is not None else None
-        if found is None or path is None:
-            return None
-        index = len(header["textures"])
-        header["textures"].append({"source": index, "sampler": index})
-        header["samplers"].append({"wrapS": found.sampler.wrapS, "wrapT": found.sampler.wrapT})
-        header["images"].append({"uri": quote(str(path))})
-        return {"index": index}
-
-    table: dict[str, Any] = {"name": name, "alphaMode": given.alphaMode, "alphaCutoff": given.alphaCutoff}
-    glossy = hasattr(given, "diffuseFactor")
-    base, picture_of = ("diffuseFactor", "diffuseTexture") if glossy else ("baseColorFactor", "baseColorTexture")
-    factor = np.clip(np.asarray(getattr(given, base), dtype=np.float64), 0, 1)
-    if given.alphaMode == "BLEND" and not _seen_through(factor[3], getattr(given, picture_of), primitive):
-        # pyrender blends whatever it makes of a trimesh; what cannot be seen through is drawn as what it is.
-        table["alphaMode"] = "OPAQUE"
-    if flat or not glossy:
-        info = {"baseColorFactor": factor.tolist(), "baseColorTexture": texture(picture_of)}
-        # The texture's first two channels, wherever they came from, as in pyrender's shader.
-        packed = {} if flat else {"metallicRoughnessTexture": texture("metallicRoughnessTexture")}
-        numbers = {} if flat else {"metallicFactor": given.metallicFactor, "roughnessFactor": given.roughnessFactor}
-        table["pbrMetallicRoughness"] = {**info, **packed, **numbers}
+def _instances(primitive: Any, pose: Array) -> Iterator[Array]:
+    if primitive.poses is None:
+        yield pose
     else:
-        specular = np.clip(np.asarray(given.specularFactor, dtype=np.float64), 0, 1).tolist()
-        old: dict[str, Any] = {"diffuseFactor": factor.tolist(), "diffuseTexture": texture(picture_of)}
-        # The property calls itself without end in pyrender 0.1.45.
-        old |= {"specularFactor": specular, "glossinessFactor": given._glossinessFactor}
-        if given.specularGlossinessTexture is not None:
-            old["specularGlossinessTexture"] = {}
-        table["extensions"] = {"KHR_materials_pbrSpecularGlossiness": old}
-    if not flat:
-        table["emissiveFactor"] = np.asarray(given.emissiveFactor).tolist()
-        normals = texture("normalTexture")
-        table |= {"normalTexture": normals} if normals else {}
-        if given.occlusionTexture is not None:
-            table["occlusionTexture"] = {}
-    return _made(table, header, flat, both or given.doubleSided, given.wireframe)
+        yield from (pose @ own for own in primitive.poses.astype(np.float64))
 
 
-def _seen_through(alpha: float, texture: Any, primitive: Any) -> bool:
-    """Whether any of the surface lets light through."""
-    colours = primitive.color_0
-    textured = texture is not None and texture.source is not None and primitive.texcoord_0 is not None
-    return bool(
-        alpha < 1
-        or (colours is not None and colours.shape[1] == 4 and (colours[:, 3] < 1).any())
-        or (textured and (rgba(texture.source)[..., 3] < 255).any())
-    )
-
-
-def _made(table: dict[str, Any], header: dict[str, Any], flat: bool, both: bool, wireframe: bool) -> Brdf:
-    """The model of a glTF material. Errors: SceneError."""
-    notes = File(Path("pyrender"), Path("/"), b"")
-    keys = gltf_material.material(notes, header, [], table)
-    keys["sides"] = "both" if both else "front"
-    for line in notes.contents.warnings + ["pyrender: wireframes are drawn solid"] * wireframe:
-        warnings.warn(line, AssetWarning, stacklevel=2)
-    if isinstance(keys.get("roughness"), dict):
-        # pyrender's shader reads roughness from red and metallic from green: it has put glTF's green and blue there.
-        keys["roughness"]["channel"] = "r"
-    if isinstance(keys.get("metallic"), dict):
-        keys["metallic"]["channel"] = "g"
-    if flat:
-        base = keys["kd"]
-        # Unlit base colours are shown as they are, without decoding.
-        base = {**base, "encoding": "linear"} if isinstance(base, dict) else base
-        kept: set[str] = {"alpha", "alpha_mode", "alpha_cutoff", "sides"} & set(keys)
-        keys = {"brdf": "ambient", "ka": base, **{name: keys[name] for name in kept}}
-    try:
-        return BRDFS[keys["brdf"]].model_validate(keys)
-    except ValidationError as error:
-        faults = error.errors(include_url=False)
-        raise SceneError([f"{'.'.join(map(str, fault['loc']))}: {fault['msg']}" for fault in faults]) from None
+def _object(shape: Mesh, made: Brdf, place: Array, coloured: bool) -> Object | None:
+    """None for what is flattened: it covers no pixel."""
+    if is_singular(place[:3, :3]):
+        return None
+    # All of it is known to be right: validating it again takes longer than all else here.
+    rows: Any = tuple(map(tuple, affine_rows(place)))
+    transform = Transform.model_construct(matrix=rows)
+    return Object.model_construct(mesh=shape, transform=transform, material=made, vertex_colours=coloured)
 
 
 # --- lights ----------------------------------------------------------------------------------------------------------

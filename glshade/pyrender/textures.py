@@ -16,23 +16,29 @@ from glshade.image import Image
 
 Bytes = NDArray[np.uint8]
 # What has been written of a texture: the array, and the file.
-_written: WeakKeyDictionary[Any, tuple[Bytes, Path]] = WeakKeyDictionary()
+_written: WeakKeyDictionary[Any, dict[bool, tuple[Bytes, Path]]] = WeakKeyDictionary()
 
 
-def picture(texture: Any) -> Path | None:
-    """A PNG file with the texture's bytes, which lasts as long as the process; None for a texture without a picture."""
+def picture(texture: Any, white: bool = False) -> Path | None:
+    """A PNG file with the texture's bytes, which lasts as long as the process; None for a texture without a picture.
+
+    white: its alpha alone, on white.
+    """
     source = texture.source
     if source is None:
         return None
-    known = _written.get(texture)
+    written = _written.setdefault(texture, {})
+    known = written.get(white)
     if known is not None and known[0] is source:
         return known[1]
     pixels = rgba(source)
+    if white:
+        pixels[..., :3] = 255
     # Materials are copied deep in pyrender, and their textures with them: equal pictures are one file.
     path = _folder() / f"{hashlib.sha256(repr(pixels.shape).encode() + pixels.tobytes()).hexdigest()}.png"
     if not path.exists():
         Image(pixels, "srgb").save(path)
-    _written[texture] = source, path
+    written[white] = source, path
     return path
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.image import Image
+from glshade.part import Part
 from glshade.reference.bounds import LLVMPIPE, Bounds, Driver, alphas, bounds, depth_slack, driver_of, sealed, turnable
 from glshade.reference.inputs import Draw, Inputs, prepare
 from glshade.reference.raster import MARGIN, Fragments, rasterise, resolve
@@ -48,16 +49,21 @@ def render(scene: Scene, *, shading: Rate | None = None) -> Image:
 
     shading: overrules every object's. Errors: SceneError.
     """
-    channels = len(scene.film.background)
-    return Image(radiance(scene, shading=shading)[..., :channels].astype(np.float32), "linear")
+    film = scene.film
+    picture = radiance(scene, shading=shading)[..., : len(film.background)].astype(np.float32)
+    return Image(picture, "linear", corner=film.window[:2], whole=film.size if film.crop else None)
 
 
-def radiance(scene: Scene, *, shading: Rate | None = None, sampling: Sampling = AT_CENTRE) -> NDArray[Any]:
-    """(H, W, 4) float64, linear Rec. 709, premultiplied, row 0 at the top. Arguments and errors as for `render`.
+def radiance(
+    scene: Scene, *, shading: Rate | None = None, sampling: Sampling = AT_CENTRE, part: Part | None = None
+) -> NDArray[Any]:
+    """(H, W, 4) float64, linear Rec. 709, premultiplied, row 0 at the top; of a crop no more. Arguments and errors as for
+    `render`.
 
     sampling: how fragments are looked at, cut-outs too; what covers a pixel, and which is nearest, is told at its centre.
+    part: what of the scene is shown in place of all light.
     """
-    inputs = prepare(scene, shading)
+    inputs = prepare(part.scene(scene) if part else scene, shading, part)
     nearest, layers = resolve(inputs, rasterise(inputs), lambda fragments: is_there(inputs, fragments, sampling))
     width, height = inputs.size
     picture: NDArray[Any] = np.broadcast_to(inputs.background, (width * height, 4)).astype(sampling.dtype)
@@ -70,4 +76,5 @@ def radiance(scene: Scene, *, shading: Rate | None = None, sampling: Sampling = 
         which = np.flatnonzero(level == number)
         pixel = layers.pixel[which]
         picture[pixel] = over[which] + picture[pixel] * (1 - over[which, 3:])
-    return picture.reshape(height, width, 4)
+    wanted: NDArray[Any] = picture[inputs.wanted]
+    return wanted

@@ -19,6 +19,7 @@ from glshade.assembly import Assembly, Instance, assemble
 from glshade.brdfs import BRDFS, Brdf
 from glshade.camera import window
 from glshade.lights import Falloff, Light
+from glshade.part import Part
 from glshade.plan import ProgramPlan, plan_instance
 from glshade.reference.texturing import Sampler
 from glshade.scene import Rate, Scene
@@ -108,19 +109,30 @@ class Draw:
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """A scene as uploaded. size: width, height [pixels]. background (4,): linear, premultiplied. draws: opaque ones first."""
+    """A scene as uploaded. size: width, height [pixels]. background (4,): linear, premultiplied. draws: opaque ones first.
+
+    window: x, y, width, height [pixels] of what is wanted of the picture; nothing else has fragments.
+    """
 
     size: tuple[int, int]
     background: Array
     draws: tuple[Draw, ...]
+    window: tuple[int, int, int, int]
+
+    @cached_property
+    def wanted(self) -> Indices:
+        """(h, w): the numbers of the window's pixels in the whole picture, ascending."""
+        x, y, w, h = self.window
+        return np.add.outer(np.arange(y, y + h) * self.size[0], np.arange(x, x + w))
 
 
-def prepare(scene: Scene, shading: Rate | None = None) -> Inputs:
-    """The values that the GPU would be given for a linear picture with one sample a pixel.
+def prepare(scene: Scene, shading: Rate | None = None, part: Part | None = None) -> Inputs:
+    """The values that the GPU would be given for a linear picture with one sample a pixel. part: what of the scene it shows.
 
     Errors: SceneError, AssetError.
     """
     assembly = assemble(scene, shading)
+    assembly = part.of(assembly) if part else assembly
     colour = scene.film.background
     alpha = colour[3] if len(colour) == 4 else 1.0
     background = _wide([*(c * alpha for c in colour[:3]), alpha])
@@ -128,7 +140,7 @@ def prepare(scene: Scene, shading: Rate | None = None) -> Inputs:
     clip = _wide(window(assembly.view.clip_from_world(zero_to_one=True), (width, height), 0, 0, width, height))
     samplers: dict[Texels, Sampler] = {}
     draws = (_draw(scene, assembly, plan, instance, clip, samplers) for plan, instance in _in_order(assembly))
-    return Inputs((width, height), background, tuple(draws))
+    return Inputs((width, height), background, tuple(draws), scene.film.window)
 
 
 def draw_of(scene: Scene, assembly: Assembly, instance: Instance) -> Draw:

@@ -21,6 +21,7 @@ from glshade.reference.interpolate import weights
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
+Box = tuple[int, int, int, int]
 
 SUBPIXELS = 256
 HALF = SUBPIXELS // 2
@@ -78,7 +79,7 @@ def rasterise(inputs: Inputs, margin: float = 0.0) -> Iterator[Fragments]:
     margin [1/256 pixel]: 0 for the covered ones alone; MARGIN for every fragment that a driver might draw.
     """
     for number, draw in enumerate(inputs.draws):
-        yield from _rasterise(draw, number, inputs.size, margin)
+        yield from _rasterise(draw, number, inputs.size, inputs.window, margin)
 
 
 def resolve(inputs: Inputs, parts: Iterable[Fragments], opaque: Callable[[Fragments], Flags]) -> tuple[Fragments, Fragments]:
@@ -121,7 +122,7 @@ def resolve(inputs: Inputs, parts: Iterable[Fragments], opaque: Callable[[Fragme
     return nearest, over.take(np.lexsort((over.triangle, over.draw, over.pixel)))
 
 
-def _rasterise(draw: Draw, number: int, size: tuple[int, int], margin: float) -> Iterator[Fragments]:
+def _rasterise(draw: Draw, number: int, size: tuple[int, int], window: Box, margin: float) -> Iterator[Fragments]:
     code = clip.outside(draw.clip)
     # What sticks out at the sides may stay whole; what reaches past near or far must be cut.
     cut = (clip.outside(draw.clip, clip.GUARDED) != 0) | (code & 0b110000 != 0)
@@ -140,7 +141,7 @@ def _rasterise(draw: Draw, number: int, size: tuple[int, int], margin: float) ->
             left = corners >= 3
             pieces.append((_snapped(polygons[left], size), broken[left]))
         for polygons, which in pieces:
-            for index, x, y, covered, partial, front in _cover(polygons, size, draw, margin):
+            for index, x, y, covered, partial, front in _cover(polygons, window, draw, margin):
                 triangle = which[index] + start
                 depth = weights(draw, triangle, x + 0.5, y + 0.5, size, derivatives=False).depth
                 yield Fragments(
@@ -162,9 +163,12 @@ def _snapped(points: Array, size: tuple[int, int]) -> Array:
 
 
 def _cover(
-    polygons: Array, size: tuple[int, int], draw: Draw, margin: float
+    polygons: Array, window: Box, draw: Draw, margin: float
 ) -> Iterator[tuple[Indices, Indices, Indices, Flags, Flags, Flags]]:
-    """(polygon, x, y, covered, partial, front) of convex polygons (P, E, 2) [1/256 pixel], by polygon."""
+    """(polygon, x, y, covered, partial, front) of convex polygons (P, E, 2) [1/256 pixel], by polygon.
+
+    window: x, y, width, height [pixels] that are looked at.
+    """
     following = np.roll(polygons, -1, axis=1)
     across, down = following[..., 0] - polygons[..., 0], following[..., 1] - polygons[..., 1]
     # Twice the area, from the first corner, so that no large numbers are subtracted.
@@ -183,7 +187,8 @@ def _cover(
         drawn |= thin
     low = np.ceil((polygons.min(axis=1) - margin - HALF) / SUBPIXELS)
     high = np.floor((polygons.max(axis=1) + margin - HALF) / SUBPIXELS)
-    low, high = np.maximum(low, 0), np.minimum(high, np.array(size) - 1)
+    corner, size = np.array(window[:2]), np.array(window[2:])
+    low, high = np.maximum(low, corner), np.minimum(high, corner + size - 1)
     kept = np.flatnonzero(drawn & (low <= high).all(axis=1))
     low, high, front = low[kept], high[kept], front[kept]
     turn = np.where(area[kept] < 0, -1.0, 1.0)[:, None]

@@ -271,6 +271,8 @@ def toward_viewer(draw: Draw, position: Array) -> Array:
 def shown(draw: Draw, surface: Surface, material: SimpleNamespace | None = None) -> Array:
     """(N, 3): the sum over the lights of what the points show to the viewer. material: `material_of` them, if at hand."""
     dtype = surface.position.dtype
+    if draw.instance.shows != "light":
+        return _place(draw, surface)
     m = material or material_of(draw, surface)
     total = np.zeros((len(surface.position), 3), dtype=dtype)
     if draw.ambient.any():
@@ -294,6 +296,19 @@ def shown(draw: Draw, surface: Surface, material: SimpleNamespace | None = None)
             e = e / (r if lamp.falloff == "1/r" else r * r)[:, None]
         total += e * draw.model.brdf_cos(m, local(l), v_local)
     return total
+
+
+def _place(draw: Draw, surface: Surface) -> Array:
+    """(N, 3): what an instance shows in place of light."""
+    if draw.instance.shows == "normal":
+        return _frame(draw, surface)[2]
+    result = np.zeros_like(surface.position)
+    if draw.instance.shows == "uv":
+        result[:, :2] = surface.uv
+    else:
+        forward = draw.clip_from_world[3, :3] if draw.viewer is None else -draw.viewer
+        result[:, 0], result[:, 1] = surface.position @ forward, draw.instance.number
+    return result
 
 
 def _unit(x: Array) -> Array:

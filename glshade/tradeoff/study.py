@@ -113,7 +113,7 @@ class Pictures:
         self.scene, self.renderer = scene, renderer
         self.truth = self.exact(EXACT)
         _, self.certain = surfaces(EXACT.applied(scene))
-        if scene.film.samples > 1:
+        if scene.film.pictures > 1:
             # Edges are what several samples are for: nothing is left out.
             self.certain = np.ones_like(self.certain)
         self._exact: dict[Setting, Array] = {EXACT: self.truth}
@@ -122,12 +122,15 @@ class Pictures:
     def exact(self, setting: Setting) -> Array:
         """(H, W, 3) float64: the reference's, of the setting's model and sampling."""
         scene = setting.applied(self.scene)
-        if scene.film.samples == 1:
+        if scene.film.pictures == 1:
             return reference.radiance(scene)[..., :3]
         width, height = scene.film.size
         n = SUPERSAMPLES
-        large = scene.film.model_copy(update={"size": (width * n, height * n), "samples": 1})
+        crop = scene.film.crop and tuple(n * value for value in scene.film.crop)
+        once = {"samples": 1, "supersample": 1}
+        large = scene.film.model_copy(update={"size": (width * n, height * n), "crop": crop, **once})
         picture = reference.radiance(scene.model_copy(update={"film": large}))[..., :3]
+        *_, width, height = scene.film.window
         result: Array = picture.reshape(height, n, width, n, 3).mean(axis=(1, 3))
         return result
 
@@ -144,7 +147,7 @@ class Pictures:
         """(in all, by kind)."""
         modelled, sampled = setting.only("model"), setting.only("model", "sampling")
         # The reference has normals of length one, and samples of its own choosing.
-        by_driver = sampled.normalise is False or (sampled.samples or self.scene.film.samples) > 1
+        by_driver = sampled.normalise is False or (sampled.samples or self.scene.film.samples) * self.scene.film.supersample > 1
         model = self._reference(modelled)
         sampling = self.drawn(replace(sampled, storage="rgba32f")) if by_driver else self._reference(sampled)
         full, stored = self.drawn(replace(setting, storage="rgba32f")), self.drawn(setting)

@@ -26,7 +26,9 @@ def views(scene: Scene, count: int, start: float = 0.0, largest: int = LARGEST) 
     """
     width, height = scene.film.size
     share = min(1.0, largest / max(width, height))
-    film = scene.film.model_copy(update={"size": (max(round(width * share), 1), max(round(height * share), 1)), "samples": 1})
+    size = (max(round(width * share), 1), max(round(height * share), 1))
+    # Whole pictures, one sample a pixel: a choice has to do wherever one looks.
+    film = scene.film.model_copy(update={"size": size, "samples": 1, "supersample": 1, "crop": None})
     scene = scene.model_copy(update={"film": film})
     assembly = assemble(scene)
     view, camera = assembly.view, scene.camera

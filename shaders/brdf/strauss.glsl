@@ -11,6 +11,8 @@ struct Strauss {
     float metalness;
 };
 
+#include <diffuse>
+
 // Strauss's constants, the first two less 1: 1.12 - angle / 90 degrees is KF + height, without its cancellation.
 const float KF = 0.12;
 const float KG = 0.01;
@@ -35,7 +37,6 @@ vec3 brdf_cos(Strauss m, Frame f, vec3 l, vec3 v) {
     float NoV = dot(f.n, v);
     float s = m.smoothness;
     float smooth3 = s * s * s;
-    float diffuse = (1.0 - m.metalness * s) * (1.0 - s) * (1.0 + s + s * s) * NoL;
     vec2 of_l = angles(f.n, l);
     float x = of_l.y + KF;
     float fresnel = of_l.x * (x + 1.0 + KF) / (x * x) * (KF * KF / (1.0 + 2.0 * KF));
@@ -46,7 +47,7 @@ vec3 brdf_cos(Strauss m, Frame f, vec3 l, vec3 v) {
     // 1 + m (F - 1) (1 - kd) as a sum of what is not negative.
     vec3 colour = m.kd * (m.metalness * (1.0 - fresnel)) + (1.0 - m.metalness + m.metalness * fresnel);
     float lit = NoL > 0.0 && NoV > 0.0 ? INV_PI : 0.0;
-    return m.kd * (lit * diffuse) + colour * (lit * lobe);
+    return m.kd * (lit * strauss_diffuse(m, NoL)) + colour * (lit * lobe);
 }
 
 vec3 ambient_reflectance(Strauss m) {

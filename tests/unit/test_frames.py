@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glshade.cli import cli
-from glshade.frames import parse, pictures
+from glshade.frames import Sweep, parse, parse_sweep, pictures
 from glshade.picture_file import read
 from glshade.scene_file import SceneFile
 
@@ -53,7 +54,7 @@ def test_what_is_no_range(text: str) -> None:
 
 def test_names(file: SceneFile) -> None:
     def names(*arguments: Any) -> list[str]:
-        return [str(picture.output) for picture in pictures([file], *arguments)]
+        return [str(picture.output) for picture in pictures([file.path], *arguments)]
 
     assert names(None, (), None) == ["s.png"]
     assert names([1, 20], (), None) == ["s.0001.png", "s.0020.png"]
@@ -69,11 +70,70 @@ def test_names(file: SceneFile) -> None:
         ((None, ("a", "b"), "x.png"), "lacks {camera}"),
         ((None, (), "x.#.png"), "say which, by --frames"),
         (([1], (), "{frame}.png"), "{frame} is not known"),
+        ((None, (), "x.png", [Sweep("a.b", ("1", "2"))]), "lacks {a.b}"),
+        (
+            (None, (), "{x}{b}.png", [Sweep("a.b", ("1",)), Sweep("c.b", ("1",))]),
+            "{b} is not known; known: {scene}, {camera}, {a.b}, {c.b} and",
+        ),
+        ((None, (), "{b}.png", [Sweep("a.b", ("1 2", "1/2"))]), "several pictures one name"),
     ],
 )
 def test_names_that_are_none(file: SceneFile, arguments: Any, fault: str) -> None:
-    with pytest.raises(ValueError, match=fault):
-        list(pictures([file], *arguments))
+    with pytest.raises(ValueError, match=re.escape(fault)):
+        list(pictures([file.path], *arguments))
+
+
+@pytest.mark.parametrize(
+    ("text", "values"),
+    [
+        ("a.b=1,2,3", ("1", "2", "3")),
+        ("a.b = [1, 2], [3,4] ", ("[1, 2]", "[3,4]")),
+        ('a.b="x,y",z', ('"x,y"', "z")),
+        ("a.b={k=[1,2],l=3},4", ("{k=[1,2],l=3}", "4")),
+    ],
+)
+def test_a_sweep_is_its_values(text: str, values: tuple[str, ...]) -> None:
+    assert parse_sweep(text) == Sweep("a.b", values)
+
+
+@pytest.mark.parametrize("text", ["a.b", "a.b=", "a.b=1,,2", "a.b=1,[2", "=1,2"])
+def test_what_is_no_sweep(text: str) -> None:
+    with pytest.raises(ValueError, match=r"KEY=VALUE|not a value"):
+        parse_sweep(text)
+
+
+def test_every_combination_of_the_sweeps_has_its_name(file: SceneFile) -> None:
+    sweeps = [Sweep("materials.red.kd", ("0.1", "[1, 0, 0]")), Sweep("film.samples", ("1", "4"))]
+
+    def names(*arguments: Any) -> list[str]:
+        return [str(picture.output) for picture in pictures([file.path], *arguments)]
+
+    assert names(None, (), None, sweeps) == [
+        "s.kd-0.1.samples-1.png",
+        "s.kd-0.1.samples-4.png",
+        "s.kd-1_0_0.samples-1.png",
+        "s.kd-1_0_0.samples-4.png",
+    ]
+    assert names(None, (), "{samples}/{materials.red.kd}.png", sweeps)[:3] == ["1/0.1.png", "4/0.1.png", "1/1_0_0.png"]
+    assert names([3], ("top",), None, sweeps[1:]) == ["s.samples-1.top.0003.png", "s.samples-4.top.0003.png"]
+    both = [Sweep("a.kd", ("1",)), Sweep("b.kd", ("2",))]
+    assert names(None, (), None, both) == ["s.a.kd-1.b.kd-2.png"]
+    found = list(pictures([file.path], None, (), None, sweeps))
+    assert found[1].overrides == (("materials.red.kd", "0.1"), ("film.samples", "4"))
+
+
+def test_what_a_name_holds_is_not_a_pattern() -> None:
+    (picture,) = pictures([Path("a#{camera}.toml")], [7], (), "{scene}.##.png")
+    assert picture.output == Path("a#{camera}.07.png")
+
+
+def test_a_frame_shares_what_its_tracks_leave_alone(file: SceneFile) -> None:
+    one, other = file.scene(2), file.scene(3)
+    assert one.objects[0] is other.objects[0]
+    assert one.materials["red"] is not other.materials["red"]
+    still = SceneFile("s.toml", {"animation": []})
+    assert still.scene(1) is still.scene(2)
+    assert still.scene(1, "top") is still.scene(2, "top")
 
 
 def test_the_scene_at_a_frame_through_a_camera(file: SceneFile) -> None:
@@ -97,8 +157,8 @@ def test_a_batch(file: SceneFile) -> None:
     assert not Path("f.04.png").exists()
     before = Path("f.02.png").stat().st_mtime_ns
     skipped = run("-f", "2-4", "-o", "f.##.png", "--skip-existing")
-    assert skipped.output.split() == ["f.04.png"]
+    assert skipped.stdout.split() == ["f.04.png"]
     assert Path("f.02.png").stat().st_mtime_ns == before
-    assert run("-f", "2-4", "-o", "f.##.png", "--overwrite").output.split() == ["f.02.png", "f.03.png", "f.04.png"]
+    assert sorted(run("-f", "2-4", "-o", "f.##.png", "--overwrite").stdout.split()) == ["f.02.png", "f.03.png", "f.04.png"]
     assert run("-f", "2", "-o", "f.##.png").exit_code == 0, "one picture replaces its file"
     assert np.array_equal(read("f.03.png")[0][..., :3], bright)

@@ -256,8 +256,8 @@ class Mutilated(Renderer):
         pixels: NDArray[np.float32] = self.render(scene, dtype="float32").pixels.copy()
         return pixels
 
-    def _program(self, source: Source) -> Any:
-        return super()._program(self.programs.get(source, source))
+    def _program(self, source: Source, flat: bool = False) -> Any:
+        return super()._program(self.programs.get(source, source), flat)
 
     def _set_state(self, blended: bool, added: bool, culled: bool, mirrored: bool) -> None:
         super()._set_state(blended, added, culled or self.culled, mirrored)

@@ -17,6 +17,7 @@ import pytest
 
 import glshade
 from glshade import BRDFS, LIGHTS, GlshadeError, SceneError, from_pyrender
+from glshade.gl.renderer import ApproximateWarning
 from glshade.mesh_file import AssetWarning
 from glshade.pyrender import OffscreenRenderer, RenderFlags
 from glshade.pyrender.scene import mesh
@@ -195,12 +196,26 @@ def test_triangles_strips_and_fans(mode: int, order: Any, triangles: Any) -> Non
     assert turned[0] == turned[1]
 
 
-def test_points_and_lines_are_left_out_and_said() -> None:
-    with pytest.warns(AssetWarning, match="points are not drawn"):
-        scene = from_pyrender(stage(node(square(mode=0), square())))
-    assert len(scene.objects) == 1
-    with pytest.warns(AssetWarning, match="lines are not drawn"), pytest.raises(SceneError, match="no visible triangles"):
-        from_pyrender(stage(node(square(mode=3))))
+def test_points_and_lines_become_strips_as_wide_as_pixels() -> None:
+    """Seen from 4 m in front at a field of view of 1 radian, 480 pixels high."""
+    pixel = 2 * math.tan(0.5) * 4 / 480
+    dots, line = (from_pyrender(stage(node(square(mode=mode)))).objects[0].mesh for mode in (0, 2))
+    assert isinstance(dots, glshade.Mesh)
+    assert isinstance(line, glshade.Mesh)
+    assert len(dots.triangles) == 6 * 2
+    np.testing.assert_allclose(np.ptp(dots.positions[:4], axis=0), [pixel, pixel, 0], rtol=1e-4, atol=1e-7)
+    # A closed loop, the six corners of two triangles.
+    assert len(line.triangles) == 6 * 2
+    np.testing.assert_allclose(np.ptp(line.positions[:4], axis=0), [2, pixel, 0], rtol=1e-4, atol=1e-7)
+
+
+def test_points_need_a_camera() -> None:
+    blind = stage(node(square(mode=0), square()))
+    blind.main_camera_node = None
+    with pytest.warns(AssetWarning, match="points and lines are left out"):
+        assert len(from_pyrender(blind).objects) == 1
+    with pytest.raises(SceneError, match="nothing to draw"):
+        from_pyrender(stage())
 
 
 def test_a_primitive_is_read_again_when_it_has_new_arrays() -> None:
@@ -287,10 +302,16 @@ CAMERAS = {
 }
 
 
+def middle_depth(renderer: OffscreenRenderer, scene: Thing) -> Any:
+    """With SEG there is one sample, in the middle of each pixel."""
+    return renderer.render(scene, RenderFlags.SEG, dict.fromkeys(scene.mesh_nodes, 255))[1]
+
+
 @pytest.mark.parametrize("name", CAMERAS)
 def test_depth_is_where_the_ray_of_each_pixel_meets_the_plane(offscreen: OffscreenRenderer, name: str) -> None:
     camera, focal, middle = CAMERAS[name]
-    depth = offscreen.render(stage(node(square(), pose=moved(turn=TILTED)), camera=camera), RenderFlags.DEPTH_ONLY)
+    scene = stage(node(square(), pose=moved(turn=TILTED)), camera=camera)
+    depth = middle_depth(offscreen, scene)
     assert depth.shape == (HEIGHT, WIDTH)
     assert depth.dtype == np.float32
     x = (np.arange(WIDTH) + 0.5 - middle[0]) / focal[0]
@@ -302,17 +323,28 @@ def test_depth_is_where_the_ray_of_each_pixel_meets_the_plane(offscreen: Offscre
     inside = np.abs(p[..., :2]).max(axis=-1) < 1
     assert inside.sum() > 200
     np.testing.assert_array_equal(depth > 0, inside)
+    t = np.broadcast_to(t, depth.shape)
     np.testing.assert_allclose(depth[inside], t[inside], rtol=1e-6)
+    # Otherwise at the first of several samples: somewhere in the pixel, the same place in each.
+    sampled = offscreen.render(scene, RenderFlags.DEPTH_ONLY)
+    both = inside & (sampled > 0)
+    assert (inside ^ (sampled > 0)).sum() < 60
+    # The plane is tilted about y: 1 / depth falls evenly along x.
+    offsets = (1 / sampled[both] - 1 / t[both]) * -4 * n[2] / n[0] * focal[0]
+    assert np.abs(offsets).max() < 0.5
+    assert np.ptp(offsets) < 1e-3
+    np.testing.assert_array_equal(offscreen.render(scene)[1], sampled)
 
 
 def test_depth_of_an_orthographic_view(offscreen: OffscreenRenderer) -> None:
     """pyrender itself undoes a perspective there that has not taken place."""
     camera = Thing(xmag=9.0, ymag=1.5, znear=0.1, zfar=50.0, name=None)
-    depth = offscreen.render(stage(node(square(), pose=moved(turn=TILTED)), camera=camera), RenderFlags.DEPTH_ONLY)
+    depth = middle_depth(offscreen, stage(node(square(), pose=moved(turn=TILTED)), camera=camera))
     x = (np.arange(WIDTH) + 0.5 - WIDTH / 2) * 3 / HEIGHT
     expected = np.broadcast_to(4 + x * TILTED[0, 2] / TILTED[2, 2], depth.shape)
     assert (depth > 0).sum() > 500
-    np.testing.assert_allclose(depth[depth > 0], expected[depth > 0], rtol=1e-6)
+    # Steps of float32 from 0 to 50 m, evenly spread.
+    np.testing.assert_allclose(depth[depth > 0], expected[depth > 0], rtol=0, atol=50 / 2**23)
 
 
 def test_segments_are_the_nodes_that_are_named(offscreen: OffscreenRenderer) -> None:
@@ -379,14 +411,139 @@ def test_nothing_to_draw_is_background(offscreen: OffscreenRenderer) -> None:
     assert not depth.any()
 
 
-def test_what_is_drawn_with_lines_is_an_error(offscreen: OffscreenRenderer) -> None:
-    for flag in ("VERTEX_NORMALS", "FACE_NORMALS", "ALL_WIREFRAME", "FLIP_WIREFRAME"):
-        with pytest.raises(GlshadeError, match=f"{flag}: glshade draws no lines"):
-            offscreen.render(stage(node(square())), RenderFlags[flag] | RenderFlags.RGBA)
+def test_what_is_cut_out_is_cut_out_of_its_segment(offscreen: OffscreenRenderer) -> None:
+    codes = np.full((1, 2, 4), 255)
+    codes[0, 1, 3] = 0
+    cut = node(square(rough(alphaMode="MASK", baseColorTexture=texture(codes, 33071, 33071))))
+    colour, depth = offscreen.render(stage(cut), RenderFlags.SEG, {cut: (9, 99, 199)})
+    assert {tuple(c) for c in colour.reshape(-1, 3)} == {(0, 0, 0), (9, 99, 199)}
+    assert tuple(colour[HEIGHT // 2, 25]) == (9, 99, 199)
+    assert not colour[HEIGHT // 2, 39].any()
+    np.testing.assert_array_equal(depth > 0, colour.any(axis=2))
+
+
+def test_what_is_seen_through_is_mixed_as_shown_and_has_depth(offscreen: OffscreenRenderer) -> None:
+    glass = rough(baseColorFactor=np.array([1.0, 0, 0, 0.25]), alphaMode="BLEND")
+    scene = stage(node(square(glass), pose=moved(z=1)), node(square()), ambient_light=np.full(3, 0.5))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ApproximateWarning)
+        colour, depth = offscreen.render(scene)
+    light = 0.5 ** (1 / 2.2)
+    np.testing.assert_allclose(colour[HEIGHT // 2, WIDTH // 2], 255 * light * np.array([1, 0.75, 0.75]), atol=1)
+    assert depth[HEIGHT // 2, WIDTH // 2] == pytest.approx(3, rel=1e-6)
+
+
+def test_a_point_is_a_square_of_pixels(offscreen: OffscreenRenderer) -> None:
+    # In the middle of a pixel, half a pixel right of and above the middle of the picture.
+    half = math.tan(0.5) * 4 / HEIGHT
+    dot = node(
+        square(mode=0, positions=np.array([[half, half, 0], [0, 0, 9]], dtype=np.float32), indices=None, texcoord_0=None)
+    )
+    for size in (1, 3, 5):
+        offscreen.point_size = size
+        colour, depth = offscreen.render(stage(dot), RenderFlags.SEG, {dot: 7})
+        y, x = np.nonzero(depth)
+        assert (len(y), set(x), set(y)) == (
+            size**2,
+            set(range(32 - size // 2, 33 + size // 2)),
+            set(range(23 - size // 2, 24 + size // 2)),
+        )
+        assert set(colour[y, x].ravel()) == {7}
+        assert depth[depth > 0] == pytest.approx(4, rel=1e-6)
+    offscreen.point_size = 1
+    # It faces the viewer: all that shines from there is reflected.
+    lamp = Thing(color=np.ones(3), intensity=4.0 * 16, name=None)
+    lit = stage(dot, point_light_nodes={Thing(light=lamp, pose=moved(z=4))}, bg_color=np.zeros(4))
+    faced = stage(node(square(texcoord_0=None)), point_light_nodes=lit.point_light_nodes, bg_color=np.zeros(4))
+    one, other = (offscreen.render(scene, RenderFlags.RGBA)[0] for scene in (lit, faced))
+    covered = one[..., 3] / 255
+    assert covered.sum() == pytest.approx(1, abs=0.02)
+    assert one[..., 0].sum() == pytest.approx(int(other[23, 32, 0]), abs=3)
+
+
+def test_lines_end_where_the_viewer_begins(offscreen: OffscreenRenderer) -> None:
+    """One from 4 m in front to behind the viewer's back, a hand's breadth to the left."""
+    ends = np.array([[-0.2, 0, 0], [-0.2, 0, 9]], dtype=np.float32)
+    line = node(square(mode=1, positions=ends, indices=None, texcoord_0=None))
+    depth = middle_depth(offscreen, stage(line))
+    y, x = np.nonzero(depth)
+    assert set(y) <= {HEIGHT // 2 - 1, HEIGHT // 2}
+    assert x.min() == 0
+    nearest = depth[y, x].min()
+    assert 0.1 < nearest < 0.4
+    # The pixel next to the far end has its middle where the line is 3.5 m away.
+    assert 3.5 < depth.max() < 4
+
+
+def test_wireframes(offscreen: OffscreenRenderer) -> None:
+    solid, wire = stage(node(square())), stage(node(square(rough(wireframe=True))))
+    filled, lines = ((offscreen.render(scene, RenderFlags.FLAT)[1] > 0) for scene in (solid, wire))
+    assert 0 < lines.sum() < filled.sum() / 3
+    for scene, flag, expected in (
+        (solid, RenderFlags.ALL_WIREFRAME, lines),
+        (wire, RenderFlags.ALL_WIREFRAME, lines),
+        (solid, RenderFlags.FLIP_WIREFRAME, lines),
+        (wire, RenderFlags.FLIP_WIREFRAME, filled),
+        (wire, RenderFlags.DEPTH_ONLY, filled),
+    ):
+        found = offscreen.render(scene, flag)
+        np.testing.assert_array_equal((found if flag == RenderFlags.DEPTH_ONLY else found[1]) > 0, expected)
+
+
+def test_what_has_changed_is_seen(offscreen: OffscreenRenderer) -> None:
+    """What is kept from picture to picture is kept while nothing changes, arrays changed in place included."""
+    given = square(rough(baseColorFactor=np.array([0.5, 0.2, 0.8, 1])))
+    place = node(given)
+    scene = stage(place, ambient_light=np.full(3, 0.5))
+    pictures = [offscreen.render(scene)[0]]
+    np.testing.assert_array_equal(offscreen.render(scene)[0], pictures[0])
+
+    def changed() -> None:
+        pictures.append(offscreen.render(scene)[0])
+        assert (pictures[-1] != pictures[-2]).any()
+
+    given.material.baseColorFactor[0] = 0.9
+    changed()
+    scene.ambient_light[1] = 0.9
+    changed()
+    place.pose[0, 3] = 0.5
+    changed()
+    scene.main_camera_node.pose[1, 3] = 0.5
+    changed()
+    given.positions = SQUARE / 2
+    changed()
+    given.material.baseColorTexture = texture(np.full((2, 2, 3), 100))
+    changed()
+    given.material.baseColorTexture.source = np.full((2, 2, 3), 200, dtype=np.uint8)
+    changed()
+    scene.bg_color[0] = 0.25
+    changed()
+
+
+def test_more_lights_than_a_page_are_refused(offscreen: OffscreenRenderer) -> None:
+    lamps = {Thing(light=Thing(color=np.ones(3), intensity=1.0, name=None), pose=moved(0.01 * i, z=3)) for i in range(300)}
+    with pytest.raises(SceneError, match="more than 256 lights of a kind"):
+        offscreen.render(stage(node(square()), point_light_nodes=lamps))
+
+
+def test_normals_are_left_out_and_said_once(offscreen: OffscreenRenderer) -> None:
+    scene = stage(node(square()))
+    with pytest.warns(UserWarning, match="viewer alone"):
+        offscreen.render(scene, RenderFlags.FACE_NORMALS)
+    np.testing.assert_array_equal(offscreen.render(scene, RenderFlags.VERTEX_NORMALS)[0], offscreen.render(scene)[0])
+
+
+def test_two_renderers_and_two_scenes_in_turn(offscreen: OffscreenRenderer) -> None:
+    scenes = [stage(node(square(rough(baseColorFactor=np.array([c, 0, 0, 1.0]))))) for c in (0.2, 0.8)]
+    other = OffscreenRenderer(WIDTH, HEIGHT)
+    codes = [[r.render(s, RenderFlags.FLAT)[0][24, 32, 0] for s in scenes] for r in (offscreen, other, offscreen)]
+    assert codes == [[51, 204]] * 3
+    other.delete()
+    assert offscreen.render(scenes[0], RenderFlags.FLAT)[0][24, 32, 0] == 51
 
 
 def test_shadows_are_left_out_and_said_once(offscreen: OffscreenRenderer) -> None:
-    with pytest.warns(UserWarning, match="not local shading"):
+    with pytest.warns(AssetWarning, match="not local shading"):
         offscreen.render(stage(node(square())), RenderFlags.SHADOWS_ALL)
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -1,0 +1,49 @@
+"""Digest: all that a picture depends on, in 64 letters. Equal digests, equal bytes."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from functools import cache
+from pathlib import Path
+
+from glshade import __version__, picture_file
+from glshade.batch.task import Task
+from glshade.digest import digest as scene_digest
+from glshade.scene import Scene
+from glshade.source import SHADERS
+
+# The name under which a picture's file says it.
+ATTRIBUTE = "glshade:digest"
+
+
+def digest(scene: Scene, task: Task, driver: str) -> str:
+    """SHA-256 of the scene as it is drawn, its files by their content; of what draws it; and of how it is written."""
+    said = {
+        "scene": scene_digest(scene),
+        "shading": task.shading,
+        "reference": task.reference,
+        # Of a picture in pieces, the last bit may differ.
+        "tile": task.tile,
+        "driver": driver,
+        "made by": code(),
+        "suffix": Path(task.output).suffix.lower(),
+    }
+    return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
+
+
+def digest_of(path: str | Path) -> str:
+    """What a picture's file says of itself; nothing where it says nothing."""
+    return picture_file.attributes(path).get(ATTRIBUTE, "")
+
+
+@cache
+def code() -> str:
+    """glshade's version, its shaders, and what writes the files."""
+    import OpenImageIO as oiio
+
+    h = hashlib.sha256(f"{__version__} {oiio.VERSION_STRING}".encode())
+    for path in sorted(SHADERS.rglob("*")):
+        if path.is_file():
+            h.update(f"\0{path.relative_to(SHADERS).as_posix()}\0".encode() + path.read_bytes())
+    return h.hexdigest()

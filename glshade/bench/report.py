@@ -1,0 +1,164 @@
+"""Report: everything that a run has measured, on what, as JSON and as tables."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import date
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Any
+
+from glshade import __version__
+from glshade.bench.contest import Row
+from glshade.bench.growth import AN_OBJECT, NEAR_LINEAR, Growth
+from glshade.bench.jobs import TARGET, Jobs
+from glshade.bench.works import GLSHADE, WORKS
+from glshade.gl.clock import Spread
+
+# Raised where a key changes its meaning or goes; keys may be added.
+SCHEMA = 1
+
+Table = tuple[str, list[tuple[str, ...]]]
+
+
+@dataclass
+class Report:
+    """A run. small: only to see that it works; contests: work -> rows."""
+
+    repeat: int
+    small: bool
+    contests: dict[str, list[Row]] = field(default_factory=dict)
+    growths: list[Growth] = field(default_factory=list)
+    jobs: Jobs | None = None
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        works = {
+            name: {"what": WORKS[name].what, "limit_seconds": WORKS[name].limit, "rows": [row.as_dict() for row in rows]}
+            for name, rows in self.contests.items()
+        }
+        return {
+            "schema": SCHEMA,
+            "date": date.today().isoformat(),
+            "machine": machine(),
+            "versions": versions([row.program for rows in self.contests.values() for row in rows]),
+            "repeat": self.repeat,
+            "small": self.small,
+            "works": works,
+            "growth": [growth.as_dict() for growth in self.growths],
+            "jobs": self.jobs and self.jobs.as_dict(),
+        }
+
+    def tables(self) -> Iterator[Table]:
+        """Title and rows of text, the first the heading, of each thing measured."""
+        for name, rows in self.contests.items():
+            yield f"{name}: {WORKS[name].what}", list(_contest(name, rows))
+        if self.growths:
+            yield "growth of the time of a frame with what is in it", list(_growths(self.growths))
+        if self.jobs:
+            yield f"jobs: {WORKS['W4'].what}", list(_jobs(self.jobs))
+
+    def heading(self) -> list[str]:
+        """On what, and how, in a few lines."""
+        on = machine()
+        named = ", ".join(f"{name} {number}" for name, number in versions([r.program for r in self._rows()]).items())
+        drivers = dict.fromkeys(row.driver for row in self._rows() if row.driver)
+        lines = [f"{on['cpu']}, {on['threads']} threads; {on['system']}; Python {on['python']}", named]
+        lines += [f"drivers: {'; '.join(drivers)}"] if drivers else []
+        lines += [f"median, and least to most, of {self.repeat} rounds in turn; ratio: glshade's time over the program's"]
+        return [*lines, *(["small: these times say nothing"] if self.small else [])]
+
+    def _rows(self) -> list[Row]:
+        return [row for rows in self.contests.values() for row in rows]
+
+
+def machine() -> dict[str, Any]:
+    """What it was measured on."""
+    threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return {"cpu": _cpu(), "threads": threads, "system": platform.platform(terse=True), "python": platform.python_version()}
+
+
+def _cpu() -> str:
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+    except OSError:
+        lines = []
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(named, platform.machine())
+
+
+def versions(programs: Sequence[str]) -> dict[str, str]:
+    """Program -> version of its library, glshade's among them."""
+    found = {GLSHADE: __version__}
+    for name in programs:
+        try:
+            found.setdefault(name, version(name))
+        except PackageNotFoundError:
+            found[name] = "?"
+    return found
+
+
+def markdown(report: Report) -> str:
+    """The tables as GitHub's Markdown."""
+    parts = ["\n".join(f"- {line}" for line in report.heading())]
+    for title, (heads, *rows) in report.tables():
+        lines = [heads, ("---",) * len(heads), *rows]
+        parts.append(f"### {title[0].upper()}{title[1:]}\n\n" + "\n".join(f"| {' | '.join(line)} |" for line in lines))
+    return "\n\n".join(parts) + "\n"
+
+
+def _contest(name: str, rows: Sequence[Row]) -> Iterator[tuple[str, ...]]:
+    """Milliseconds, or seconds where files are written."""
+    unit, scale = ("s", 1.0) if WORKS[name].kind == "files" else ("ms", 1e3)
+    commands = any(row.whole for row in rows)
+    heads = ("program", unit, "range", "ratio", "range", "target", "picture")
+    yield heads[:3] + ("whole command",) * commands + heads[3:]
+    for row in rows:
+        label = f"{row.program} by hand" if row.program == "moderngl" else row.program
+        if row.fault is not None:
+            yield (label, *["-"] * (5 + commands), row.fault)
+            continue
+        whole = (_figures(row.whole, 1.0)[0] + " s",) if row.whole else ("-",)
+        limit = WORKS[name].limit
+        if row.program == GLSHADE and limit is not None and row.whole is not None:
+            whole = (f"{whole[0]} (<= {limit:g} s: {_word(row.whole.median <= limit)})",)
+        aim = "" if row.target is None else f"<= {row.target:.2f}: {_word(row.met)}"
+        picture = "" if row.program == GLSHADE else "the same" if row.same else f"another ({row.codes} codes)"
+        yield (label, *_figures(row.seconds, scale), *(whole if commands else ()), *_figures(row.ratio, 1.0), aim, picture)
+
+
+def _growths(growths: Sequence[Growth]) -> Iterator[tuple[str, ...]]:
+    yield "what", "from, to", "ms", "each", "exponent", "at the end", "target"
+    for growth in growths:
+        ends = f"{growth.sizes[0]:,}, {growth.sizes[-1]:,}"
+        milliseconds = " ".join(f"{spread.median * 1e3:.3g}" for spread in growth.seconds)
+        aim = f"<= {NEAR_LINEAR:g}" + (f", <= {AN_OBJECT * 1e6:g} us each" if growth.what == "objects" else "")
+        exponents = (f"{growth.exponent:.2f}", f"{growth.at_the_end:.2f}")
+        yield (growth.what, ends, milliseconds, f"{growth.each * 1e6:.3g} us", *exponents, f"{aim}: {_word(growth.met)}")
+
+
+def _jobs(jobs: Jobs) -> Iterator[tuple[str, ...]]:
+    yield "jobs", "frames/s", "range", "ratio", "range", "target"
+    for count, rate in jobs.rates.items():
+        last = count == max(jobs.rates)
+        aim = f">= {TARGET:g}: {_word(jobs.met)}" if last else ""
+        yield (str(count), *_figures(rate, 1.0), *_figures(jobs.ratio if last else None, 1.0), aim)
+
+
+def _figures(spread: Spread | None, scale: float) -> tuple[str, str]:
+    if spread is None:
+        return "", ""
+    median, low, high = (_short(x * scale) for x in (spread.median, spread.low, spread.high))
+    return median, f"{low} to {high}"
+
+
+def _short(x: float) -> str:
+    """Three digits, or what is before the point."""
+    return f"{x:.0f}" if x >= 100 else f"{x:.1f}" if x >= 10 else f"{x:.2f}"
+
+
+def _word(met: bool | None) -> str:
+    return "yes" if met else "no"

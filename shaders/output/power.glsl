@@ -1,0 +1,4 @@
+// Encoded with a power of 1 / 2.2, and premultiplied after that: what lies behind is mixed in as it is shown.
+vec4 encode(vec3 c, float alpha) {
+    return vec4(pow(clamp(c, 0.0, 1.0), vec3(1.0 / 2.2)) * alpha, alpha);
+}

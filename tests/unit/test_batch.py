@@ -1,0 +1,415 @@
+"""Several pictures: what is made, what is left out, what fails, and what the command says of it."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from glshade import picture_file
+from glshade.batch import jobs, leftovers
+from glshade.batch.digest import digest, digest_of
+from glshade.batch.maker import Drawn, Maker
+from glshade.batch.record import Record
+from glshade.batch.task import Task
+from glshade.errors import ContextError
+from glshade.scene_file import load
+
+# Exposure is the frame's number: what draws can tell which one it is.
+SCENE = """
+objects = [ { name = "ball", shape = "sphere", material = { brdf = "phong", exponent = 20 } } ]
+animation = [ { key = "film.exposure", frames = [0, 60], values = [0, 60] } ]
+lights = [ { type = "directional", direction = [-1, -1, -1], intensity = 0.01 } ]
+[film]
+size = [32, 24]
+"""
+# Loaded by every Python that is started with this folder on its path: a driver that does not survive a certain picture.
+CRASH = """
+import os, pathlib
+try:
+    from glshade.gl.renderer import Renderer
+except ImportError:
+    pass
+else:
+    draw = Renderer.render
+    def render(self, scene, **options):
+        if scene.film.exposure == 3 and not (pathlib.Path({once!r}).exists() if {once!r} else False):
+            if {once!r}:
+                pathlib.Path({once!r}).touch()
+            os.abort()
+        return draw(self, scene, **options)
+    Renderer.render = render
+"""
+NO_DRIVER = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent"}
+PATIENCE = 60
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    (tmp_path / "s.toml").write_text(SCENE)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.fixture
+def run(folder: Path, glshade: Any) -> Any:
+    """`run(*arguments)`: glshade render s.toml in the folder, as a process."""
+
+    def run(*arguments: object, **environment: str) -> subprocess.CompletedProcess[str]:
+        done: subprocess.CompletedProcess[str] = glshade("render", "s.toml", *arguments, cwd=folder, **environment)
+        assert "Traceback" not in done.stderr
+        return done
+
+    return run
+
+
+@pytest.fixture
+def maker(renderer: Any) -> Maker:
+    """On the tests' own context: to close it is not for the maker."""
+    maker = Maker()
+    maker._renderer = renderer
+    return maker
+
+
+def events(done: subprocess.CompletedProcess[str]) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in done.stdout.splitlines()]
+
+
+def crash(folder: Path, once: str = "") -> dict[str, str]:
+    """The environment in which frame 3 ends its process with SIGABRT; with a file's name, only the first time."""
+    hook = folder / "hook"
+    hook.mkdir()
+    (hook / "sitecustomize.py").write_text(CRASH.format(once=once and str(folder / once)))
+    return {"PYTHONPATH": str(hook)}
+
+
+class TestCrash:
+    """A worker dies in the driver."""
+
+    def test_a_picture_that_kills_its_worker_takes_no_other_with_it(self, run: Any, folder: Path) -> None:
+        done = run("-f", "1-6", "-o", "out/f.#.png", "--jobs", "2", "--retries", "1", **crash(folder))
+        assert done.returncode == 1
+        assert sorted(done.stdout.split()) == [f"out/f.{frame}.png" for frame in (1, 2, 4, 5, 6)]
+        said = done.stderr.splitlines()
+        assert "glshade: out/f.3.png: the driver ended the process that drew it, 2 times (SIGABRT)" in said
+        assert "glshade: 1 of 6 pictures failed: out/f.3.png" in said
+        lines = [json.loads(line) for line in Path("out/manifest.jsonl").read_text().splitlines()]
+        (failed,) = (line for line in lines if line["state"] == "failed")
+        assert (failed["output"], failed["attempts"], failed["exit_code"]) == ("f.3.png", 2, 1)
+        assert not [name for name in os.listdir("out") if name.startswith(".")]
+        again = run("-f", "1-6", "-o", "out/f.#.png", "--resume")
+        assert (again.returncode, again.stdout) == (0, "out/f.3.png\n")
+
+    def test_what_goes_well_the_second_time_is_done(self, run: Any, folder: Path) -> None:
+        done = run("-f", "1-4", "-o", "f.#.png", "--json", **crash(folder, once="crashed"))
+        assert done.returncode == 0
+        attempts = {event["output"]: event["attempts"] for event in events(done) if event["event"] == "done"}
+        assert set(attempts) == {f"f.{frame}.png" for frame in range(1, 5)}
+        assert attempts["f.3.png"] == 2
+
+    def test_a_driver_that_nothing_survives(self, run: Any, folder: Path) -> None:
+        (folder / "hook").mkdir()
+        (folder / "hook" / "sitecustomize.py").write_text(
+            "import os, sys\nif 'glshade.batch.worker' in sys.orig_argv: os.abort()"
+        )
+        done = run("-f", "1-4", "-o", "f.#.png", PYTHONPATH=str(folder / "hook"))
+        assert done.returncode == 5
+        assert done.stderr == "glshade: the driver ends the process that opens it (SIGABRT)\n"
+        assert not list(folder.glob("f.*"))
+
+
+class TestResume:
+    """What is done is told by what stands in the file."""
+
+    def test_only_what_is_not_this_picture_is_made(self, run: Any, folder: Path) -> None:
+        render = ("-f", "1-4", "-o", "f.#.png", "--resume")
+        assert len(run(*render).stdout.split()) == 4
+        before = {path: path.stat().st_mtime_ns for path in folder.glob("f.*.png")}
+        assert run(*render).stdout == ""
+        assert {path: path.stat().st_mtime_ns for path in folder.glob("f.*.png")} == before
+        (folder / "f.2.png").write_bytes((folder / "f.3.png").read_bytes())
+        (folder / "f.4.png").unlink()
+        assert sorted(run(*render).stdout.split()) == ["f.2.png", "f.4.png"]
+        assert len(run(*render, "--set", "objects.ball.material.exponent=21").stdout.split()) == 4
+        lines = Path("manifest.jsonl").read_text().splitlines()
+        assert len(lines) == 4 + 2 + 4
+
+    def test_one_picture(self, run: Any) -> None:
+        assert run("-o", "x.png", "--resume").stdout == "x.png\n"
+        assert run("-o", "x.png", "--resume").stdout == ""
+        assert run("-o", "x.png").stdout == "x.png\n"
+        assert run("-o", "x.png", "--resume", "--shading", "flat").stdout == "x.png\n"
+        assert not Path("manifest.jsonl").exists()
+
+    def test_layers_beside_the_picture_belong_to_it(self, maker: Maker, folder: Path) -> None:
+        task = Task(0, "s.toml", "x.png", film={"aovs": ["depth"]}, resume=True)
+        assert maker.make(task).state == "done"
+        assert maker.make(task).state == "skipped"
+        Path("x.aovs.exr").unlink()
+        assert maker.make(task).state == "done"
+        assert maker.make(replace(task, output="y.exr")).state == "done"
+        assert maker.make(replace(task, output="y.exr")).state == "skipped"
+        assert not Path("y.aovs.exr").exists()
+
+    @pytest.mark.parametrize("suffix", sorted(picture_file.SUFFIXES - {".hdr"}))
+    def test_every_format_says_it(self, suffix: str, maker: Maker, folder: Path) -> None:
+        record = maker.make(Task(0, "s.toml", f"x{suffix}"))
+        assert len(record.digest) == 64
+        assert digest_of(record.output) == record.digest
+
+    def test_what_the_digest_holds(self, folder: Path) -> None:
+        (folder / "tri.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        (folder / "m.toml").write_text('objects = [ { mesh = "tri.obj" } ]')
+        scene, task = load("m.toml"), Task(0, "m.toml", "x.png")
+        first = digest(scene, task, "driver")
+        for same in (
+            replace(task, number=7),
+            replace(task, output="a/y.png"),
+            replace(task, resume=True),
+        ):
+            assert digest(scene, same, "driver") == first
+        others = {
+            digest(scene, task, "another"),
+            digest(scene, replace(task, output="x.exr"), "driver"),
+            digest(scene, replace(task, shading="flat"), "driver"),
+            digest(scene, replace(task, tile=64), "driver"),
+            digest(scene, replace(task, reference=True), "driver"),
+            digest(load("m.toml", {"film.exposure": 1}), task, "driver"),
+        }
+        (folder / "tri.obj").write_text("v 0 0 0\nv 2 0 0\nv 0 1 0\nf 1 2 3\n")
+        others.add(digest(load("m.toml"), task, "driver"))
+        assert len(others | {first}) == 8
+
+    def test_leftovers_are_those_of_processes_that_are_gone(self, folder: Path) -> None:
+        gone = subprocess.Popen([sys.executable, "-c", ""])
+        gone.wait()
+        ours = [f".x.{gone.pid}.png", f".x.aovs.{gone.pid}.exr"]
+        others = [f".x.{os.getpid()}.png", f".y.{gone.pid}.png", ".x.png", ".x.7a.png", "x.1.png"]
+        for name in (*ours, *others):
+            (folder / name).touch()
+        leftovers.remove([folder / "x.png"])
+        assert sorted(path.name for path in folder.iterdir() if path.name != "s.toml") == sorted(others)
+
+
+class TestFaults:
+    """What fails says so once, and leaves nothing half-written."""
+
+    def test_a_full_disk_stops_the_batch(self, folder: Path) -> None:
+        command = f"ulimit -f 4; {sys.executable} -m glshade render s.toml -f 1-40 -o out/f.##.png --size 256x256 --jobs 2"
+        environment = {**os.environ, "GLSHADE_PROGRAM_CACHE": "0", "MESA_SHADER_CACHE_DISABLE": "true"}
+        done = subprocess.run(
+            ["bash", "-c", command], cwd=folder, capture_output=True, text=True, timeout=PATIENCE, env=environment, check=False
+        )
+        assert (done.returncode, done.stdout) == (1, "")
+        said = done.stderr.splitlines()
+        assert said[0].startswith("glshade: out/f.")
+        assert said[0].endswith("cannot be written: File too large")
+        assert "pictures are not made: --resume goes on" in done.stderr
+        assert len(said) < 12
+        assert os.listdir("out") == ["manifest.jsonl"]
+
+    def test_a_folder_that_cannot_be(self, run: Any, folder: Path) -> None:
+        (folder / "out").touch()
+        done = run("-f", "1-4", "-o", "out/f.#.png")
+        assert (done.returncode, done.stderr) == (1, "glshade: out: cannot be made: File exists\n")
+
+    def test_one_output_in_the_way_is_its_own_fault(self, run: Any, folder: Path) -> None:
+        (folder / "f.2.png").mkdir()
+        done = run("-f", "1-4", "-o", "f.#.png", "--overwrite")
+        assert done.returncode == 1
+        assert sorted(done.stdout.split()) == ["f.1.png", "f.3.png", "f.4.png"]
+        assert "f.2.png: cannot be written: Is a directory" in done.stderr
+
+    def test_an_asset_that_vanishes(self, maker: Maker, folder: Path) -> None:
+        (folder / "tri.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        (folder / "m.toml").write_text('objects = [ { mesh = "tri.obj" } ]\nfilm = { size = [8, 8] }')
+        task = Task(0, "m.toml", "x.png")
+        assert maker.make(task).state == "done"
+        (folder / "tri.obj").unlink()
+        record = maker.make(replace(task, output="y.png"))
+        assert (record.state, record.exit_code) == ("failed", 3)
+        assert record.error.startswith("m.toml: objects[0].mesh: ")
+        assert record.error.endswith("tri.obj: no such file")
+        assert not Path("y.png").exists()
+
+    def test_without_a_driver(self, run: Any, folder: Path) -> None:
+        done = run("-f", "1-4", "-o", "f.#.png", "--backend", "egl", **NO_DRIVER)
+        assert done.returncode == 5
+        assert done.stderr.count("\n") == 1
+        # The reference needs none.
+        done = run("-f", "1-4", "-o", "f.#.png", "--reference", "--size", "8x6", **NO_DRIVER)
+        assert (done.returncode, len(done.stdout.split())) == (0, 4)
+
+    def test_a_faulty_scene_is_told_before_anything_is_made(self, run: Any, folder: Path) -> None:
+        done = run("-f", "1-4", "-o", "f.#.png", "--set", "objects.ball.material.exponent=-1")
+        assert done.returncode == 3
+        assert done.stderr.count("\n") == 1
+        done = run("-f", "1-9", "-o", "f.#.png", "--size", "200000x3")
+        assert done.returncode == 2
+        assert "'--size'" in done.stderr
+        assert sorted(os.listdir()) == ["s.toml"]
+
+    def test_a_fault_that_comes_with_the_frame(self, run: Any, folder: Path) -> None:
+        done = run("-f", "62-70", "-o", "f.#.png", "--set", "animation.0.values=[0,100]", "--set", "animation.0.frames=[0,100]")
+        assert done.returncode == 1
+        assert sorted(done.stdout.split()) == ["f.62.png", "f.63.png", "f.64.png"]
+        assert "film.exposure: must be less than or equal to 64, not 65" in done.stderr
+
+    @pytest.mark.parametrize(
+        ("arguments", "message"),
+        [
+            (("--resume", "--overwrite"), "exclude each other"),
+            (("--jobs", "0"), "'--jobs'"),
+            (("--sweep", "a"), "'--sweep': 'a' is not KEY=VALUE"),
+            (("--crop", "1,2"), "'1,2' is not a window such as 10,20,64x48"),
+            (("--crop", "0,0,64x1"), "'--crop': reaches to 64, 1, beyond the picture, which is 32 x 24"),
+            (("--aov", "depht"), "'--aov': unknown layer 'depht'; did you mean \"depth\"?"),
+            (("--supersample", "99"), "'--supersample': must be"),
+            (("--cluster", "nowhere"), "'--cluster': 'nowhere' is neither"),
+        ],
+    )
+    def test_usage(self, arguments: tuple[str, ...], message: str, folder: Path) -> None:
+        from click.testing import CliRunner
+
+        from glshade.cli import cli
+
+        result = CliRunner().invoke(cli, ["render", "s.toml", *arguments])
+        assert result.exit_code == 2
+        assert message in result.output
+        assert sorted(os.listdir()) == ["s.toml"]
+
+
+class TestCommand:
+    """What the command makes and says."""
+
+    def test_events(self, run: Any) -> None:
+        done = run("-f", "0-3", "-o", "f.#.png", "--json", "--jobs", "1")
+        first, *records, last = events(done)
+        assert first | {"driver": ""} == {"event": "begin", "pictures": 4, "jobs": 1, "driver": ""}
+        assert first["driver"]
+        assert {(record["event"], record["frame"], record["output"]) for record in records} == {
+            ("done", frame, f"f.{frame}.png") for frame in range(4)
+        }
+        assert {name: last[name] for name in ("event", "done", "skipped", "failed", "left")} == {
+            **{"event": "end", "done": 4, "skipped": 0, "failed": 0, "left": 0}
+        }
+        assert 0 < last["seconds_pictures"] < last["seconds"]
+        assert done.stderr == ""
+        first, *records, last = events(run("-f", "0-4", "-o", "f.#.png", "--json", "--skip-existing"))
+        assert sorted(record["event"] for record in records) == ["done", *["skipped"] * 4]
+        assert (last["done"], last["skipped"]) == (1, 4)
+
+    def test_a_sweep_is_what_set_makes(self, run: Any) -> None:
+        done = run(
+            "--sweep", "objects.ball.material.exponent=5,500", "--sweep", "film.size=[8,6],[4,3]", "-o", "{exponent}/{size}.png"
+        )
+        assert sorted(done.stdout.split()) == ["5/4_3.png", "5/8_6.png", "500/4_3.png", "500/8_6.png"]
+        run("-o", "x.png", "--set", "objects.ball.material.exponent=500", "--set", "film.size=[8,6]")
+        assert Path("500/8_6.png").read_bytes() == Path("x.png").read_bytes()
+        assert Path("5/8_6.png").read_bytes() != Path("x.png").read_bytes()
+
+    def test_the_bytes_do_not_depend_on_who_makes_them(self, run: Any) -> None:
+        for jobs_ in (1, 2):
+            run("-f", "1-5", "-o", f"{jobs_}/f.#.png", "--jobs", jobs_)
+        run("-f", "4", "-o", "x.png")
+        for frame in range(1, 6):
+            assert Path(f"1/f.{frame}.png").read_bytes() == Path(f"2/f.{frame}.png").read_bytes()
+        assert Path("x.png").read_bytes() == Path("1/f.4.png").read_bytes()
+
+    def test_the_film_and_its_layers(self, run: Any) -> None:
+        assert (
+            run("-o", "x.exr", "--crop", "8,6,16x12", "--supersample", "2", "--aov", "depth,normal", "--aov", "uv").returncode
+            == 0
+        )
+        assert run("-o", "y.exr", "--supersample", "2").returncode == 0
+        crop, whole = (picture_file.read(name)[0] for name in ("x.exr", "y.exr"))
+        assert np.array_equal(crop[..., :3], whole[6:18, 8:24, :3])
+        import OpenImageIO as oiio
+
+        source = oiio.ImageInput.open("x.exr")
+        assert {"R", "depth.Z", "normal.X", "uv.U"} <= set(source.spec().channelnames)
+        source.close()
+
+    def test_ctrl_c_finishes_what_is_begun(self, run: Any, folder: Path) -> None:
+        command = [sys.executable, "-m", "glshade", "render", "s.toml", "-f", "1-3000", "-o", "out/f.#.png", "--jobs", "2"]
+        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        assert process.stdout is not None
+        process.stdout.readline()
+        process.send_signal(signal.SIGINT)
+        rest, said = process.communicate(timeout=PATIENCE)
+        assert process.returncode == 130, said
+        assert said.splitlines()[-1] == "glshade: interrupted"
+        made = [name for name in os.listdir("out") if name != "manifest.jsonl"]
+        assert len(made) == 1 + len(rest.split()) < 2000
+        assert all(name.startswith("f.") for name in made)
+        assert len(Path("out/manifest.jsonl").read_text().splitlines()) == len(made)
+
+    def test_a_warning_is_said_once(self, run: Any, folder: Path) -> None:
+        (folder / "s.toml").write_text(SCENE.replace('"phong"', '"phong", alpha_mode = "blend", alpha = 0.5'))
+        done = run("-f", "1-8", "-o", "f.#.png", "--jobs", "2")
+        assert done.returncode == 0
+        assert done.stderr.count("warning: blended surfaces") == 1
+        assert done.stderr.count("\n") == 1
+
+
+def test_drawn_and_written_by_two_threads(maker: Maker, folder: Path) -> None:
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(2) as writers:
+        found = []
+        for frame in range(6):
+            drawn = maker.draw(Task(frame, "s.toml", f"t.{frame}.png", frame=frame))
+            assert isinstance(drawn, Drawn)
+            found.append(writers.submit(drawn.write))
+    assert [record.result().state for record in found] == ["done"] * 6
+    for frame in range(6):
+        alone = maker.make(Task(frame, "s.toml", f"a.{frame}.png", frame=frame))
+        assert isinstance(alone, Record)
+        assert Path(f"a.{frame}.png").read_bytes() == Path(f"t.{frame}.png").read_bytes()
+
+
+def test_jobs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(jobs, "cores", lambda: 4)
+    assert jobs.devices(None, 100, []) == [None] * 4
+    assert jobs.devices(None, 2, []) == [None]
+    assert jobs.devices(3, 2, []) == [None] * 3
+    assert jobs.devices(None, 100, [0, 2]) == [0, 2]
+    assert jobs.devices(None, 1, [0, 2]) == [0]
+    assert jobs.devices(5, 100, [0, 2]) == [0, 2, 0, 2, 0]
+    assert jobs.devices(None, 100, [1]) == [1]
+
+
+def test_a_device_that_is_not_there(folder: Path) -> None:
+    from glshade.batch.pool import Pool
+
+    with Pool([99, 99]) as pool, pytest.raises(ContextError, match="there is no EGL device 99"):
+        pool.ready()
+
+
+@pytest.mark.slow
+def test_memory_stays_flat(maker: Maker, folder: Path) -> None:
+    """Of a worker that has made 1,000 pictures, and 10,000."""
+
+    def resident() -> int:
+        text = Path("/proc/self/statm").read_text()
+        return int(text.split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+    def make(first: int, last: int) -> None:
+        for number in range(first, last):
+            record = maker.make(Task(number, "s.toml", "x.png", frame=number, film={"size": (16, 12)}))
+            assert record.state == "done"
+
+    (folder / "s.toml").write_text(SCENE.replace("[0, 60]", "[0, 20000]", 1))
+    make(0, 1000)
+    early = resident()
+    make(1000, 10_000)
+    late = resident()
+    assert late - early < 5e6, f"{early / 1e6:.1f} MB after 1,000 pictures, {late / 1e6:.1f} MB after 10,000"

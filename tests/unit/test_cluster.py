@@ -1,0 +1,382 @@
+"""A batch on dask.distributed makes the pool's pictures, whoever dies meanwhile."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from glshade.batch import cluster
+from glshade.batch.digest import code
+from glshade.batch.task import Task
+from glshade.errors import ContextError, GlshadeError
+
+pytest.importorskip("distributed")
+
+import psutil  # distributed brings it
+
+SCENE = """
+film = { size = [192, 192], samples = 4 }
+camera = { eye = [0, 1, 4], target = [0, 0, 0] }
+materials.red = { brdf = "blinn_phong", kd = [0.6, 0.06, 0.05], ks = 0.5, exponent = 80 }
+objects = [{ shape = { type = "sphere", segments = 96, rings = 48 }, material = "red" }, { shape = "cube", material = "red" }]
+lights = [{ type = "directional", direction = [0.6, -1, -0.7] }]
+animation = [{ key = "camera.turn", frames = [1, 30], values = [0, 90] }]
+"""
+FRAMES = 30
+
+
+class Batch:
+    """One command, as its own process group, watched."""
+
+    def __init__(self, scene: Path, folder: Path, *options: str, **environment: str) -> None:
+        self.folder = folder
+        command = [sys.executable, "-m", "glshade", "render", str(scene), "-f", f"1-{FRAMES}", "-o", str(folder / "####.png")]
+        self.process = subprocess.Popen(
+            [*command, *options],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            env={**os.environ, **environment},
+        )
+
+    def pictures(self) -> dict[str, int]:
+        """What is there: name -> time of writing [ns]."""
+        return {path.name: path.stat().st_mtime_ns for path in self.folder.glob("[0-9]*.png")}
+
+    def at(self, count: int) -> dict[str, int]:
+        """Waits until there are so many pictures, or it has ended."""
+        while len(self.pictures()) < count and self.process.poll() is None:
+            time.sleep(0.005)
+        return self.pictures()
+
+    def workers(self) -> list[psutil.Process]:
+        """The processes of a local cluster's workers."""
+        return [child for child in self.children() if "spawn_main" in " ".join(child.cmdline())]
+
+    def children(self) -> list[psutil.Process]:
+        return psutil.Process(self.process.pid).children(recursive=True)
+
+    def ended(self) -> tuple[int, str]:
+        """Exit code and stderr."""
+        error = self.process.communicate(timeout=300)[1]
+        return self.process.returncode, error
+
+    def lines(self) -> Counter[str]:
+        """How many lines of the manifest say that an output is done."""
+        text = (self.folder / "manifest.jsonl").read_text()
+        return Counter(line["output"] for line in map(json.loads, text.splitlines()) if line["state"] == "done")
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("scene") / "turn.toml"
+    path.write_text(SCENE)
+    return path
+
+
+@pytest.fixture(scope="module")
+def expected(scene: Path, tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """The pool's pictures."""
+    batch = Batch(scene, tmp_path_factory.mktemp("pool"), "--jobs", "2")
+    code, error = batch.ended()
+    assert code == 0, error
+    made = contents(batch.folder)
+    assert len(made) == FRAMES
+    return made
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.glob("*.png")}
+
+
+def temporary(folder: Path) -> list[str]:
+    return [path.name for path in folder.iterdir() if path.name.startswith(".")]
+
+
+def gone(processes: list[psutil.Process]) -> bool:
+    return not psutil.wait_procs(processes, timeout=10)[1]
+
+
+def check(batch: Batch, expected: dict[str, bytes], before: dict[str, int]) -> None:
+    """All there, the pool's bytes, one line each; and what was there before was not written again."""
+    assert contents(batch.folder) == expected
+    assert batch.lines() == Counter(dict.fromkeys(expected, 1))
+    assert temporary(batch.folder) == []
+    after = batch.pictures()
+    assert {name: after[name] for name in before} == before
+
+
+LOCAL = ("--cluster", "local", "--jobs", "2")
+
+
+def test_a_worker_that_is_killed_costs_nothing(scene: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
+    batch = Batch(scene, tmp_path, *LOCAL)
+    before = batch.at(2)
+    workers = batch.workers()
+    assert len(workers) == 2
+    workers[0].kill()
+    code, error = batch.ended()
+    assert (code, error) == (0, "")
+    check(batch, expected, before)
+    assert gone(workers)
+
+
+def test_a_driver_that_is_killed_goes_on_where_it_was(scene: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
+    killed = Batch(scene, tmp_path, *LOCAL)
+    killed.at(2)
+    children = killed.children()
+    killed.process.kill()
+    assert killed.ended()[0] == -signal.SIGKILL
+    assert gone(children)
+    before = killed.pictures()
+    assert 2 <= len(before) < FRAMES
+    resumed = Batch(scene, tmp_path, *LOCAL, "--resume")
+    code, error = resumed.ended()
+    assert (code, error) == (0, "")
+    check(resumed, expected, before)
+
+
+def test_an_interruption_leaves_nothing_behind(scene: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
+    batch = Batch(scene, tmp_path, *LOCAL)
+    batch.at(2)
+    children = batch.children()
+    # As a terminal does: to all of the group.
+    os.killpg(batch.process.pid, signal.SIGINT)
+    code, error = batch.ended()
+    assert code == 130, error
+    assert "Traceback" not in error
+    assert gone(children)
+    assert temporary(tmp_path) == []
+    # What was made is whole, and has its line.
+    made = contents(tmp_path)
+    assert 2 <= len(made) < FRAMES
+    assert made == {name: expected[name] for name in made}
+    assert batch.lines() == Counter(dict.fromkeys(made, 1))
+
+
+# Workers die of frame 7: dask starts them by multiprocessing, and the module is read by every Python.
+CRASHES = """
+import os, sys
+if "spawn_main" in " ".join(sys.orig_argv):
+    from glshade.batch.maker import Maker
+    draw = Maker.draw
+    def crash(self, task, *rest):
+        if task.frame == 7:
+            os.kill(os.getpid(), 11)
+        return draw(self, task, *rest)
+    Maker.draw = crash
+"""
+
+
+def test_a_frame_that_kills_its_worker_fails_alone(scene: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
+    (tmp_path / "site").mkdir()
+    (tmp_path / "site/sitecustomize.py").write_text(CRASHES)
+    (tmp_path / "out").mkdir()
+    batch = Batch(scene, tmp_path / "out", *LOCAL, "--retries", "1", PYTHONPATH=str(tmp_path / "site"))
+    code, error = batch.ended()
+    assert code == 1
+    assert "0007.png: the worker that drew it died, 2 times" in error
+    assert contents(batch.folder) == {name: data for name, data in expected.items() if name != "0007.png"}
+    failed = [line for line in (batch.folder / "manifest.jsonl").read_text().splitlines() if '"failed"' in line]
+    assert len(failed) == 1
+    assert "0007.png" in failed[0]
+
+
+class Dask:
+    """A scheduler and a worker process of its command line, on one machine."""
+
+    def __init__(self, folder: Path) -> None:
+        self.file = folder / "scheduler.json"
+        quiet = {**os.environ, "DASK_LOGGING__DISTRIBUTED": "critical"}
+        self.processes = [
+            self._start(quiet, "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(self.file)),
+            # More threads than one: dask's default, a thread a core.
+            self._start(quiet, "worker", "--scheduler-file", str(self.file), "--nworkers", "1", "--nthreads", "4"),
+        ]
+
+    @staticmethod
+    def _start(environment: dict[str, str], kind: str, *options: str) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *options]
+        return subprocess.Popen(command, env=environment)
+
+    @property
+    def address(self) -> str:
+        while not self.file.exists():
+            time.sleep(0.02)
+        return str(json.loads(self.file.read_text())["address"])
+
+    def end(self) -> None:
+        for process in reversed(self.processes):
+            process.terminate()
+        for process in self.processes:
+            process.wait(30)
+
+
+@pytest.fixture(scope="module")
+def dask(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Dask]:
+    started = Dask(tmp_path_factory.mktemp("dask"))
+    yield started
+    started.end()
+
+
+def test_a_scheduler_of_somebody_elses(dask: Dask, scene: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
+    batch = Batch(scene, tmp_path, "--cluster", dask.address)
+    code, error = batch.ended()
+    assert (code, error) == (0, "")
+    check(batch, expected, {})
+
+
+# After the others, which want the scheduler alive.
+def test_a_scheduler_that_is_lost_is_said_and_resumed(
+    dask: Dask, scene: Path, expected: dict[str, bytes], tmp_path: Path
+) -> None:
+    batch = Batch(scene, tmp_path, "--cluster", dask.address)
+    batch.at(2)
+    # So that it is certainly lost before the last picture.
+    workers = psutil.Process(dask.processes[1].pid).children(recursive=True)
+    for worker in workers:
+        worker.suspend()
+    dask.processes[0].kill()
+    code, error = batch.ended()
+    for worker in workers:
+        worker.resume()
+    assert code == 1
+    assert "is lost" in error
+    assert "--resume" in error
+    # Its worker has to end what it draws before it is heard no more.
+    dask.end()
+    before = batch.pictures()
+    assert 2 <= len(before) < FRAMES
+    resumed = Batch(scene, tmp_path, "--jobs", "2", "--resume")
+    assert resumed.ended()[0] == 0
+    check(resumed, expected, before)
+
+
+def test_nobody_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(cluster, "CONNECTING", 0.3)
+    with pytest.raises(GlshadeError, match=r"no dask scheduler answers at tcp://127\.0\.0\.1:9: ") as caught:
+        cluster.Cluster("tcp://127.0.0.1:9")
+    assert caught.value.exit_code == 1
+
+
+@pytest.mark.parametrize("address", ["lokal", "tcp://", "tcp://host", "http://host:8786", "host:8786"])
+def test_what_is_no_address(address: str) -> None:
+    with pytest.raises(ValueError, match="tcp://host:8786"):
+        cluster.check_address(address)
+
+
+def test_usage(glshade: Any, scene: Path) -> None:
+    done = glshade("render", scene, "--cluster", "nowhere")
+    assert done.returncode == 2
+    assert "'nowhere' is neither local nor a scheduler's address" in done.stderr
+
+
+@pytest.fixture
+def how() -> Iterator[cluster.How]:
+    """For `make` in this process."""
+    yield {"code": code(), "backend": "auto", "device": None, "reference": False, "hardware": False}
+    cluster._forget()
+
+
+def test_another_glshade_is_refused(how: cluster.How) -> None:
+    with pytest.raises(GlshadeError, match="has another glshade"):
+        cluster.make([], {**how, "code": "0"})
+
+
+def test_a_worker_without_glshade_says_so(python: Any, tmp_path: Path) -> None:
+    # dask ends a worker that cannot read what it is sent: reading must be possible, and calling must be what fails.
+    import cloudpickle
+
+    (tmp_path / "sent").write_bytes(cloudpickle.dumps(cluster._sendable()))
+    read = "import sys, pickle; sys.modules['glshade'] = None; sent = pickle.load(open('sent', 'rb'))\n"
+    call = "try: sent([], {})\nexcept ImportError as error: print('glshade' in str(error))"
+    assert python(read + call, cwd=tmp_path) == "True"
+
+
+def test_a_gpu_that_is_none_is_refused(how: cluster.How, renderer: Any) -> None:
+    if "llvmpipe" not in renderer.context.renderer:
+        pytest.skip("here is a GPU")
+    with pytest.raises(ContextError, match="has a GPU, but the driver's own choice draws on the CPU"):
+        cluster.make([], {**how, "hardware": True})
+
+
+def test_the_worker_s_environment_names_its_device(how: cluster.How, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("GLSHADE_DEVICE", "63")
+    with pytest.raises(ContextError, match=r"the worker on .*63"):
+        cluster.make([], {**how, "device": 0})
+
+
+def test_what_was_written_since_is_not_drawn_again(how: cluster.How, scene: Path, tmp_path: Path) -> None:
+    output = tmp_path / "1.png"
+    task = Task(0, str(scene), str(output), frame=1).as_dict()
+    first = cluster.make([(task, 0)], how)["records"][0]
+    written = output.stat().st_mtime_ns
+    # As when the worker dies before it can say so, and dask gives the task to another.
+    again = cluster.make([(task, 0)], how)["records"][0]
+    assert output.stat().st_mtime_ns == written
+    assert again["state"] == "done"
+    assert again["sha256"] == first["sha256"]
+    # As with --overwrite: it was there before.
+    cluster.make([(task, written)], how)
+    assert output.stat().st_mtime_ns > written
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("victim", ["driver", "worker"])
+def test_fifty_kills(victim: str, scene: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
+    """SIGKILL after any time: what is resumed is what would have been, and nothing is written twice."""
+    chance = random.Random(victim)
+    kills = runs = 0
+    while kills < 50:
+        folder = tmp_path / str(runs)
+        folder.mkdir()
+        runs += 1
+        before: dict[str, int] = {}
+        options: tuple[str, ...] = LOCAL
+        while True:
+            batch = Batch(scene, folder, *options)
+            if victim == "worker":
+                kills += _kill_workers(batch, chance)
+            elif len(before) < FRAMES:
+                # Before the first picture and between the last and the end too.
+                batch.at(len(before) + chance.randint(0, 8))
+                time.sleep(chance.uniform(0, 0.05))
+                batch.process.kill()
+            ended = batch.ended()[0]
+            kills += victim == "driver" and ended != 0
+            after = batch.pictures()
+            assert {name: after[name] for name in before} == before
+            before = after
+            options = (*LOCAL, "--resume")
+            if ended == 0:
+                break
+        check(batch, expected, before)
+    print(f"{kills} kills in {runs} batches")
+
+
+def _kill_workers(batch: Batch, chance: random.Random) -> int:
+    """Kills a worker now and then, as long as the batch lives; how often."""
+    kills = 0
+    while batch.process.poll() is None and kills < 5:
+        batch.at(chance.randint(1, FRAMES - 1) if kills == 0 else 0)
+        time.sleep(chance.uniform(0, 0.5))
+        try:
+            workers = batch.workers()
+            if workers:
+                chance.choice(workers).kill()
+                kills += 1
+        except psutil.Error:
+            pass
+    return kills
