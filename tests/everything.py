@@ -230,7 +230,7 @@ class EverythingRenderer(Renderer):
         return self
 
     def _draw(
-        self, plan: ProgramPlan, instance: Instance, assembly: Assembly, exposure: float, lights: Any, pages: Any
+        self, plan: ProgramPlan, instance: Instance, assembly: Assembly, exposure: float, flat: bool, lights: Any, pages: Any
     ) -> Iterator[Draw]:
         assert plan.rate == "phong"
         assert plan.encoding == "linear"

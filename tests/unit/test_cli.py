@@ -33,7 +33,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: object) -> Result:
-        from glshade.cli import main
+        from glshade.cli import run as main
 
         monkeypatch.setattr(sys, "argv", ["glshade", *map(str, arguments)])
         # main() sends warnings to stderr; pytest would have them as errors.
@@ -314,9 +314,9 @@ class TestAsAProcess:
             b"\0" * 80 + b"\1\0\0\0" + np.float32([0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0]).tobytes() + b"\0\0"
         )
         code = (
-            "import sys; from glshade.cli import main\n"
+            "import sys; from glshade.cli import run\n"
             "sys.argv = ['glshade', 'render', 'm.stl', '--size', '8x8']\n"
-            "try:\n    main()\n"
+            "try:\n    run()\n"
             "except SystemExit as e:\n    print(e.code, sorted({'trimesh', 'rich', 'PIL', 'scipy'} & set(sys.modules)))"
         )
         cache = str(tmp_path / "cache")

@@ -27,7 +27,7 @@ def run(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> 
     """`run(*arguments)` gives (exit code, stdout, stderr) of glshade."""
 
     def run(*arguments: str) -> tuple[int, str, str]:
-        from glshade.cli import main
+        from glshade.cli import run as main
 
         monkeypatch.setattr(sys, "argv", ["glshade", *arguments])
         with pytest.raises(SystemExit) as exit:

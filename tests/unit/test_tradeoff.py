@@ -545,7 +545,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: object) -> tuple[int, str, str]:
-        from glshade.cli import main
+        from glshade.cli import run as main
 
         monkeypatch.setattr(sys, "argv", ["glshade", "tradeoff", *map(str, arguments)])
         with pytest.raises(SystemExit) as exit:
