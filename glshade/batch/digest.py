@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 from functools import cache
 from pathlib import Path
 
@@ -28,6 +29,7 @@ def digest(scene: Scene, task: Task, driver: str) -> str:
         "driver": driver,
         "made by": code(),
         "suffix": Path(task.output).suffix.lower(),
+        "view": _configuration() if scene.film.transformed and scene.film.ocio is None else None,
     }
     return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()
 
@@ -35,6 +37,12 @@ def digest(scene: Scene, task: Task, driver: str) -> str:
 def digest_of(path: str | Path) -> str:
     """What a picture's file says of itself; nothing where it says nothing."""
     return picture_file.attributes(path).get(ATTRIBUTE, "")
+
+
+def _configuration() -> str:
+    """What $OCIO names, by its content where it is a file; the tables that such a file names are not looked at."""
+    named = os.environ.get("OCIO", "")
+    return hashlib.sha256(Path(named).read_bytes()).hexdigest() if named and Path(named).is_file() else named
 
 
 @cache

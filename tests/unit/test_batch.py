@@ -188,6 +188,18 @@ class TestResume:
         others.add(digest(load("m.toml"), task, "driver"))
         assert len(others | {first}) == 8
 
+    def test_the_digest_knows_the_configuration_of_a_view(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        task = Task(0, "s.toml", "x.png")
+        plain, shown = load("s.toml"), load("s.toml", {"film.view": "Raw"})
+        monkeypatch.delenv("OCIO", raising=False)
+        before = digest(plain, task, "driver"), digest(shown, task, "driver")
+        (folder / "c.ocio").write_text("one")
+        monkeypatch.setenv("OCIO", str(folder / "c.ocio"))
+        one = digest(shown, task, "driver")
+        (folder / "c.ocio").write_text("two")
+        assert len({*before, one, digest(shown, task, "driver")}) == 4
+        assert digest(plain, task, "driver") == before[0]
+
     def test_leftovers_are_those_of_processes_that_are_gone(self, folder: Path) -> None:
         gone = subprocess.Popen([sys.executable, "-c", ""])
         gone.wait()
