@@ -17,7 +17,7 @@ from glshade.picture_file import read
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]
 # The laws of the models' GLSL and of the light loops; all the others are run where there is time.
-FIRST = ("gpu_equals_reference", "finite_and_non_negative", "extremes_conditioning", "extremes_horizon", "extremes_many_lights")
+FIRST = ("gpu_equals_reference", "extremes_many_lights")
 
 
 TOLD: dict[str, dict[str, Any]] = {}

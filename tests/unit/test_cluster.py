@@ -148,6 +148,7 @@ def test_a_driver_that_is_killed_goes_on_where_it_was(scene: Path, expected: dic
     check(resumed, expected, before)
 
 
+@pytest.mark.slow
 def test_an_interruption_leaves_nothing_behind(scene: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
     batch = Batch(scene, tmp_path, *LOCAL)
     batch.at(2)
@@ -180,6 +181,7 @@ if "spawn_main" in " ".join(sys.orig_argv):
 """
 
 
+@pytest.mark.slow
 def test_a_frame_that_kills_its_worker_fails_alone(scene: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
     (tmp_path / "site").mkdir()
     (tmp_path / "site/sitecustomize.py").write_text(CRASHES)
@@ -239,6 +241,7 @@ def test_a_scheduler_of_somebody_elses(dask: Dask, scene: Path, expected: dict[s
 
 
 # After the others, which want the scheduler alive.
+@pytest.mark.slow
 def test_a_scheduler_that_is_lost_is_said_and_resumed(
     dask: Dask, scene: Path, expected: dict[str, bytes], tmp_path: Path
 ) -> None:
