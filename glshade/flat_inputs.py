@@ -41,7 +41,7 @@ def with_flat_inputs(source: Source, room: int) -> Source:
         return source
     text = "".join(f"{line}\n" for line in lines)
     for found in handed:
-        text = re.sub(rf"\bu_{found['name']}\b", f"flat_{found['name']}", text)
+        text = re.sub(rf"\bu_{found['name']}\b", f"v_u_{found['name']}", text)
     return Source(_handing_on(source.vertex, handed), Stage(text, fragment.lines))
 
 
@@ -49,9 +49,9 @@ def _handing_on(vertex: Stage, handed: list[re.Match[str]]) -> Stage:
     """The vertex stage with the uniforms, and with outputs that it sets to them."""
     lines, places = vertex.text.splitlines(), list(vertex.lines)
     main = lines.index(_MAIN)
-    body = [f"    flat_{one['name']} = u_{one['name']};" for one in handed]
+    body = [f"    v_u_{one['name']} = u_{one['name']};" for one in handed]
     head = [one[0] for one in handed if one[0] not in lines]
-    head += [f"flat out {one['type']} flat_{one['name']}{one['array'] or ''};" for one in handed]
+    head += [f"flat out {one['type']} v_u_{one['name']}{one['array'] or ''};" for one in handed]
     lines[main : main + 1] = [*head, _MAIN, *body]
     places[main : main + 1] = [("<flat inputs>", i + 1) for i in range(len(head) + 1 + len(body))]
     return Stage("".join(f"{line}\n" for line in lines), tuple(places))
