@@ -21,6 +21,9 @@ from typing import Any
 from glshade.bench.stage import EYE, Stage, eye
 from glshade.bench.works import GLSHADE
 
+# [s]
+LEAST = 0.3
+
 
 def program(name: str, stage: Stage) -> Any:
     """The program, ready to draw."""
@@ -38,9 +41,12 @@ def files(drawer: Any, count: int, folder: str) -> float:
 
 
 def draws(draw: Callable[[], Any], count: int) -> list[float]:
-    """Seconds of each frame, after one that is not counted: others have used the caches in the meantime."""
-    found = []
-    for _ in range(count + 1):
+    """Seconds of each frame, after one that is not counted: others have used the caches in the meantime.
+
+    count: at least; short frames are drawn until it is LEAST, so that one hiccup of the machine is not the median.
+    """
+    found: list[float] = []
+    while len(found) <= count or sum(found) < LEAST:
         start = perf_counter()
         draw()
         found.append(perf_counter() - start)
