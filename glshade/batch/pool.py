@@ -27,6 +27,8 @@ RETRIES = 2
 SLOW = 0.5
 # A worker that is told to end, and does not, is killed after this [s].
 PATIENCE = 10.0
+# While no worker says anything, this often somebody looks whether to stop [s].
+GLANCE = 0.1
 
 
 class Process:
@@ -119,7 +121,7 @@ class Pool:
         self._deaths: dict[int, int] = {}
         self._stillborn = 0
         self._resumed: set[int] = set()
-        self._stopping = False
+        self._stopping = self._told = False
         for device in devices:
             self._start(device)
 
@@ -139,11 +141,11 @@ class Pool:
         leftovers.remove(given)
 
     def stop(self) -> None:
-        """Nothing more is begun; what is begun will be finished."""
+        """Nothing more is begun; what is begun will be finished.
+
+        Called by signals too, perhaps in the middle of a task that is being handed out: the workers are told later.
+        """
         self._stopping = True
-        for worker in self._workers:
-            worker.process.terminate()
-            worker.end()
 
     def ready(self) -> str:
         """Waits for the first worker, and says what it draws with. Errors: ContextError."""
@@ -171,7 +173,12 @@ class Pool:
         self._selector.register(worker.stdout, selectors.EVENT_READ, worker)
 
     def _feed(self) -> bool:
-        """Hands out what there is. Whether anything is still to come."""
+        """Hands out what there is, or says that it was all. Whether anything is still to come."""
+        if self._stopping and not self._told:
+            self._told = True
+            for worker in self._workers:
+                worker.process.terminate()
+                worker.end()
         for worker in self._workers:
             while not self._stopping and worker.takes():
                 if self._suspects and not worker.tasks:
@@ -185,8 +192,8 @@ class Pool:
         return bool(self._workers) and (left or any(worker.tasks for worker in self._workers))
 
     def _hear(self) -> Iterator[Record]:
-        """Waits until a worker says something."""
-        for key, _ in self._selector.select():
+        """Waits a moment for what workers say."""
+        for key, _ in self._selector.select(GLANCE):
             worker: Process = key.data
             events = worker.hear()
             if events is None:

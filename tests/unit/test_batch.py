@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -352,15 +353,17 @@ class TestCommand:
 
     def test_ctrl_c_finishes_what_is_begun(self, run: Any, folder: Path) -> None:
         command = [sys.executable, "-m", "glshade", "render", "s.toml", "-f", "1-3000", "-o", "out/f.#.png", "--jobs", "2"]
-        process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-        assert process.stdout is not None
-        process.stdout.readline()
-        process.send_signal(signal.SIGINT)
-        rest, said = process.communicate(timeout=PATIENCE)
-        assert process.returncode == 130, said
-        assert said.splitlines()[-1] == "glshade: interrupted"
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+            assert process.stdout is not None
+            assert process.stderr is not None
+            said = [process.stdout.readline()]
+            process.send_signal(signal.SIGINT)
+            said += process.stdout
+            error = process.stderr.read()
+            assert process.wait(PATIENCE) == 130, error
+        assert error.splitlines()[-1] == "glshade: interrupted"
         made = [name for name in os.listdir("out") if name != "manifest.jsonl"]
-        assert len(made) == 1 + len(rest.split()) < 2000
+        assert len(made) == len(said) < 2000
         assert all(name.startswith("f.") for name in made)
         assert len(Path("out/manifest.jsonl").read_text().splitlines()) == len(made)
 
@@ -397,6 +400,23 @@ def test_jobs(monkeypatch: pytest.MonkeyPatch) -> None:
     assert jobs.devices(None, 1, [0, 2]) == [0]
     assert jobs.devices(5, 100, [0, 2]) == [0, 2, 0, 2, 0]
     assert jobs.devices(None, 100, [1]) == [1]
+
+
+def test_ctrl_c_while_a_task_is_handed_out(folder: Path) -> None:
+    from glshade.batch.pool import Pool
+
+    with Pool([None]) as pool:
+        pool.ready()
+        worker = pool._workers[0].process
+        # It does not read, so that what is more than a pipe holds (64 KiB) waits in the middle.
+        worker.send_signal(signal.SIGSTOP)
+        interrupt = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+        go_on = threading.Timer(0.6, worker.send_signal, (signal.SIGCONT,))
+        interrupt.start()
+        go_on.start()
+        with pytest.raises(KeyboardInterrupt):
+            list(pool.records([Task(0, "s.toml", "a.png", (("name", "n" * 200_000),))]))
+        go_on.join()
 
 
 def test_a_device_that_is_not_there(folder: Path) -> None:

@@ -120,6 +120,26 @@ def check(batch: Batch, expected: dict[str, bytes], before: dict[str, int]) -> N
 
 LOCAL = ("--cluster", "local", "--jobs", "2")
 
+# What workers do before they draw: dask starts them by multiprocessing, and the module is read by every Python.
+BEFORE = """
+import os, sys, time
+if "spawn_main" in " ".join(sys.orig_argv):
+    from glshade.batch.maker import Maker
+    draw = Maker.draw
+    def draw_after(self, task, *rest):
+        STATEMENT
+        return draw(self, task, *rest)
+    Maker.draw = draw_after
+"""
+# A batch that takes seconds: whoever disturbs it halfway does so on a busy machine too.
+SLOWLY = "time.sleep(0.1)"
+
+
+def workers_do(statement: str, folder: Path) -> dict[str, str]:
+    """The environment in which they do it, by a file in the folder."""
+    (folder / "sitecustomize.py").write_text(BEFORE.replace("STATEMENT", statement))
+    return {"PYTHONPATH": str(folder)}
+
 
 def test_a_worker_that_is_killed_costs_nothing(scene: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
     batch = Batch(scene, tmp_path, *LOCAL)
@@ -134,7 +154,8 @@ def test_a_worker_that_is_killed_costs_nothing(scene: Path, expected: dict[str, 
 
 
 def test_a_driver_that_is_killed_goes_on_where_it_was(scene: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
-    killed = Batch(scene, tmp_path, *LOCAL)
+    out = tmp_path / "out"
+    killed = Batch(scene, out, *LOCAL, **workers_do(SLOWLY, tmp_path))
     killed.at(2)
     children = killed.children()
     killed.process.kill()
@@ -142,7 +163,7 @@ def test_a_driver_that_is_killed_goes_on_where_it_was(scene: Path, expected: dic
     assert gone(children)
     before = killed.pictures()
     assert 2 <= len(before) < FRAMES
-    resumed = Batch(scene, tmp_path, *LOCAL, "--resume")
+    resumed = Batch(scene, out, *LOCAL, "--resume")
     code, error = resumed.ended()
     assert (code, error) == (0, "")
     check(resumed, expected, before)
@@ -150,7 +171,7 @@ def test_a_driver_that_is_killed_goes_on_where_it_was(scene: Path, expected: dic
 
 @pytest.mark.slow
 def test_an_interruption_leaves_nothing_behind(scene: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
-    batch = Batch(scene, tmp_path, *LOCAL)
+    batch = Batch(scene, tmp_path / "out", *LOCAL, **workers_do(SLOWLY, tmp_path))
     batch.at(2)
     children = batch.children()
     # As a terminal does: to all of the group.
@@ -159,34 +180,18 @@ def test_an_interruption_leaves_nothing_behind(scene: Path, expected: dict[str, 
     assert code == 130, error
     assert "Traceback" not in error
     assert gone(children)
-    assert temporary(tmp_path) == []
+    assert temporary(batch.folder) == []
     # What was made is whole, and has its line.
-    made = contents(tmp_path)
+    made = contents(batch.folder)
     assert 2 <= len(made) < FRAMES
     assert made == {name: expected[name] for name in made}
     assert batch.lines() == Counter(dict.fromkeys(made, 1))
 
 
-# Workers die of frame 7: dask starts them by multiprocessing, and the module is read by every Python.
-CRASHES = """
-import os, sys
-if "spawn_main" in " ".join(sys.orig_argv):
-    from glshade.batch.maker import Maker
-    draw = Maker.draw
-    def crash(self, task, *rest):
-        if task.frame == 7:
-            os.kill(os.getpid(), 11)
-        return draw(self, task, *rest)
-    Maker.draw = crash
-"""
-
-
 @pytest.mark.slow
 def test_a_frame_that_kills_its_worker_fails_alone(scene: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
-    (tmp_path / "site").mkdir()
-    (tmp_path / "site/sitecustomize.py").write_text(CRASHES)
-    (tmp_path / "out").mkdir()
-    batch = Batch(scene, tmp_path / "out", *LOCAL, "--retries", "1", PYTHONPATH=str(tmp_path / "site"))
+    crash = workers_do("if task.frame == 7: os.kill(os.getpid(), 11)", tmp_path)
+    batch = Batch(scene, tmp_path / "out", *LOCAL, "--retries", "1", **crash)
     code, error = batch.ended()
     assert code == 1
     assert "0007.png: the worker that drew it died, 2 times" in error
@@ -201,7 +206,7 @@ class Dask:
 
     def __init__(self, folder: Path) -> None:
         self.file = folder / "scheduler.json"
-        quiet = {**os.environ, "DASK_LOGGING__DISTRIBUTED": "critical"}
+        quiet = {**os.environ, "DASK_LOGGING__DISTRIBUTED": "critical", **workers_do(SLOWLY, folder)}
         self.processes = [
             self._start(quiet, "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(self.file)),
             # More threads than one: dask's default, a thread a core.

@@ -64,8 +64,8 @@ class Batch:
         self.check()
 
     def pictures(self) -> dict[str, Path]:
-        out = self.folder / "out"
-        return {path.name: path for path in sorted(out.glob("*.png"))} if out.is_dir() else {}
+        # Without what is being written, whose names begin with a dot.
+        return {path.name: path for path in sorted((self.folder / "out").glob("f.*.png"))}
 
     def look(self) -> None:
         """What was there is there, and has not been made again."""
