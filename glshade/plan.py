@@ -17,6 +17,7 @@ import numpy as np
 
 from glshade.assembly import Assembly, Instance, Shows, assemble
 from glshade.brdfs import BRDFS, Array, Brdf
+from glshade.camera import View
 from glshade.lights import Falloff, Light
 from glshade.scene import Rate, Scene
 from glshade.texels import Texels, texels
@@ -44,6 +45,9 @@ def kind(light: Light) -> tuple[str, Falloff]:
 EXACT_LIGHTS = 8
 # A page of lights in a uniform block: 16 KiB is what every driver has, and a spot light, the largest, takes 64 bytes.
 PAGE = 256
+Viewer = Literal["perspective", "perspective_close", "orthographic"]
+# The square of a shorter way to the viewer comes near to what float32 flushes to 0; nothing nearer than the near plane is seen.
+CLOSEST = 1e-15
 
 Use = Literal["uniform", "grey", "texture", "unused"]
 
@@ -92,7 +96,7 @@ class ProgramPlan:
     parameters: tuple[tuple[str, str], ...]
     lights: tuple[LightGroup, ...]
     ambient: Literal["none", "constant", "varying"]
-    viewer: Literal["perspective", "orthographic"]
+    viewer: Viewer
     both_sides: bool
     alpha: Literal["opaque", "mask", "blend"]
     alpha_from: str | None
@@ -118,11 +122,11 @@ class ProgramPlan:
         """Whether the shading needs to know where the point is."""
         if self.shows == "normal":
             # A face seen from both sides asks where the viewer is.
-            return self.rate == "flat" and self.both_sides and self.viewer == "perspective"
+            return self.rate == "flat" and self.both_sides and self.viewer != "orthographic"
         if self.shows == "depth":
             return True
         placed = any(group.falloff != "none" or group.type != "directional" for group in self.lights)
-        return placed or (self.directed and self.viewer == "perspective")
+        return placed or (self.directed and self.viewer != "orthographic")
 
     @property
     def tangents(self) -> bool:
@@ -251,7 +255,7 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         parameters=tuple(parameters),
         lights=tuple(groups),
         ambient=how,
-        viewer="perspective" if assembly.view.perspective else "orthographic",
+        viewer=_viewer(assembly.view),
         both_sides=instance.back_faces and bool(groups),
         alpha="opaque" if material.alpha_mode == "mask" and whole else material.alpha_mode,
         alpha_from=base if carries_alpha else None,
@@ -266,6 +270,12 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         normalise=instance.quality.normalise is not False or not groups or instance.rate != "phong" or bumpy or tangents,
         arithmetic=(instance.quality.arithmetic if groups else None) or "stable",
     )
+
+
+def _viewer(view: View) -> Viewer:
+    if not view.perspective:
+        return "orthographic"
+    return "perspective" if view.near >= CLOSEST else "perspective_close"
 
 
 def _bare(instance: Instance, assembly: Assembly, encoding: Literal["linear", "srgb"]) -> ProgramPlan:
@@ -284,7 +294,7 @@ def _bare(instance: Instance, assembly: Assembly, encoding: Literal["linear", "s
         parameters=(),
         lights=(),
         ambient="none",
-        viewer="perspective" if assembly.view.perspective else "orthographic",
+        viewer=_viewer(assembly.view),
         both_sides=normal and instance.back_faces,
         alpha="mask" if masked and not whole else "opaque",
         alpha_from=base if carries_alpha else None,

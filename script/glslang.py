@@ -13,12 +13,13 @@ import tempfile
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 from glshade.assembly import assemble
 from glshade.brdfs import BRDFS
 from glshade.gl.evaluate import generated
 from glshade.lights import LIGHTS
-from glshade.plan import LightGroup, ProgramPlan, plan
+from glshade.plan import LightGroup, ProgramPlan, Viewer, plan
 from glshade.scene_file import load
 from glshade.source import Source, expand, generate
 
@@ -40,7 +41,7 @@ def groups(count: int) -> tuple[LightGroup, ...]:
 
 def plans() -> Iterator[ProgramPlan]:
     """Every model at every rate with every light, and every other feature with one of them."""
-    rates, viewers = ("flat", "gouraud", "phong"), ("perspective", "orthographic")
+    rates, viewers = ("flat", "gouraud", "phong"), get_args(Viewer)
     for (name, model), use in itertools.product(BRDFS.items(), ("uniform", "texture")):
         parameters = tuple((p, use) for p in model.parameters())
         if use == "texture":

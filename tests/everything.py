@@ -260,7 +260,7 @@ class EverythingRenderer(Renderer):
         }
         integers = {
             "u_model": cases()[material.brdf, tuple(material.chosen().values())],
-            **{"u_base": base, "u_textured": textured, "u_perspective": plan.viewer == "perspective"},
+            **{"u_base": base, "u_textured": textured, "u_perspective": plan.viewer != "orthographic"},
             **{"u_both_sides": plan.both_sides, "u_vertex_colours": plan.vertex_colours, "u_turned": plan.turned},
             **{"u_normal_mapped": plan.normal_map, "u_direction_mapped": plan.direction_map},
             **{"u_alpha_mode": ("opaque", "mask", "blend").index(plan.alpha), "u_ambient": plan.ambient != "none"},

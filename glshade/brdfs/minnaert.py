@@ -15,7 +15,7 @@ class Minnaert(Brdf):
 
     The albedo is kd (n.v)^(k - 1): kd at normal incidence. k = 1 is lambert; with the light behind the viewer a sphere of
     k = 1/2 is an even disc, as the full moon nearly is. Below k = 1 the power has a pole where a cosine is 0: there each cosine
-    in it counts as 2^-20 where it is smaller. In a picture no viewer is that low: v is lifted until n.v is 1e-3.
+    in it counts as 2^-20 where it is smaller. In a picture no viewer is that low: n.v is 1e-3 at least.
     """
 
     source: ClassVar[str] = "Minnaert 1941"

@@ -22,7 +22,7 @@ Array = NDArray[Any]
 
 # Fragments shaded in one go: their arrays stay in the caches.
 PIECE = 1 << 15
-# As in the shaders: how far above the horizon of n an interpolated normal leaves the viewer.
+# As in the shaders: how far above the horizon of n lies the plane at which the viewer is mirrored.
 HORIZON = 1e-3
 # ... and how long the direction of a map has to be.
 NO_DIRECTION = 0.01
@@ -285,8 +285,9 @@ def shown(draw: Draw, surface: Surface, material: SimpleNamespace | None = None)
         return np.stack([np.einsum("ij,ij->i", axis, direction) for axis in (t, b, n)], axis=1)
 
     v = toward_viewer(draw, surface.position)
-    # A pixel that is seen faces the viewer, whatever an average of its neighbours' normals says: lifted to the horizon.
-    v = _unit(v + n * np.maximum(HORIZON - np.einsum("ij,ij->i", n, v), 0)[:, None])
+    # A pixel that is seen faces the viewer, whatever an average of its neighbours' normals says.
+    up = 2 * np.maximum(HORIZON - np.einsum("ij,ij->i", n, v), 0)[:, None]
+    v = (v + up * n) / np.sqrt(1 + 2 * HORIZON * up)
     v_local = local(v)
     for lamp in draw.lamps:
         light = lamp.fields(dtype)
