@@ -204,9 +204,9 @@ def test_a_frame_that_kills_its_worker_fails_alone(scene: Path, expected: dict[s
 class Dask:
     """A scheduler and a worker process of its command line, on one machine."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, **environment: str) -> None:
         self.file = folder / "scheduler.json"
-        quiet = {**os.environ, "DASK_LOGGING__DISTRIBUTED": "critical", **workers_do(SLOWLY, folder)}
+        quiet = {**os.environ, "DASK_LOGGING__DISTRIBUTED": "critical", **environment}
         self.processes = [
             self._start(quiet, "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", str(self.file)),
             # More threads than one: dask's default, a thread a core.
@@ -225,9 +225,9 @@ class Dask:
         return str(json.loads(self.file.read_text())["address"])
 
     def end(self) -> None:
+        # The worker first: it takes leave of the scheduler, and waits long for one that is gone.
         for process in reversed(self.processes):
             process.terminate()
-        for process in self.processes:
             process.wait(30)
 
 
@@ -245,12 +245,11 @@ def test_a_scheduler_of_somebody_elses(dask: Dask, scene: Path, expected: dict[s
     check(batch, expected, {})
 
 
-# After the others, which want the scheduler alive.
 @pytest.mark.slow
-def test_a_scheduler_that_is_lost_is_said_and_resumed(
-    dask: Dask, scene: Path, expected: dict[str, bytes], tmp_path: Path
-) -> None:
-    batch = Batch(scene, tmp_path, "--cluster", dask.address)
+def test_a_scheduler_that_is_lost_is_said_and_resumed(scene: Path, expected: dict[str, bytes], tmp_path: Path) -> None:
+    dask = Dask(tmp_path, **workers_do(SLOWLY, tmp_path))
+    out = tmp_path / "out"
+    batch = Batch(scene, out, "--cluster", dask.address)
     batch.at(2)
     # So that it is certainly lost before the last picture.
     workers = psutil.Process(dask.processes[1].pid).children(recursive=True)
@@ -267,7 +266,7 @@ def test_a_scheduler_that_is_lost_is_said_and_resumed(
     dask.end()
     before = batch.pictures()
     assert 2 <= len(before) < FRAMES
-    resumed = Batch(scene, tmp_path, "--jobs", "2", "--resume")
+    resumed = Batch(scene, out, "--jobs", "2", "--resume")
     assert resumed.ended()[0] == 0
     check(resumed, expected, before)
 
