@@ -5,14 +5,14 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import TYPE_CHECKING, Any, Literal
 
 from glshade.atomic import replacing
 from glshade.errors import AssetError, GlshadeError
-from glshade.srgb import srgb_to_linear
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
 
 FLOAT_SUFFIXES = frozenset({".exr", ".hdr"})
 BYTE_SUFFIXES = frozenset({".png", ".jpg", ".jpeg", ".tif", ".tiff"})
@@ -61,18 +61,18 @@ def write(
     if suffix in {".jpg", ".jpeg", ".hdr"}:
         pixels = pixels[..., :3]
     height, width, count = pixels.shape
-    spec = oiio.ImageSpec(width, height, count, "float" if pixels.dtype == np.float32 else "uint8")
+    spec = oiio.ImageSpec(width, height, count, "float" if pixels.dtype == "float32" else "uint8")
     if channels is not None:
         spec.channelnames = tuple(channels)
     if suffix == ".exr":
         spec.x, spec.y = corner
         spec.full_width, spec.full_height = whole or (width, height)
     # sRGB is what everybody takes an 8-bit file for, and saying so would load a colour configuration for 20 ms.
-    if pixels.dtype == np.float32 or encoding == "linear":
+    if pixels.dtype == "float32" or encoding == "linear":
         spec.attribute("oiio:ColorSpace", "lin_rec709")
     elif encoding != "srgb":
         spec.attribute("oiio:ColorSpace", encoding)
-    if pixels.dtype == np.uint8 and count == 4:
+    if pixels.dtype == "uint8" and count == 4:
         spec.attribute("oiio:UnassociatedAlpha", 1)
     spec.attribute("png:compressionLevel", PNG_LEVEL)
     spec.attribute("png:filter", PNG_FILTER_UP)
@@ -107,6 +107,8 @@ def _compact(pixels: NDArray[Any]) -> NDArray[Any]:
     """pixels (H, W, C) without gaps, as OpenImageIO takes them."""
     if pixels.flags.c_contiguous:
         return pixels
+    import numpy as np
+
     result = np.empty(pixels.shape, dtype=pixels.dtype)
     # Channel by channel: NumPy copies three numbers and skips the fourth in five times the time.
     for channel in range(pixels.shape[2]):
@@ -152,7 +154,10 @@ def read(path: str | Path, encoding: Literal["auto", "srgb", "linear"] = "auto")
 
     auto: 8-bit and 16-bit integers are taken as sRGB-encoded, floats as linear. Errors: AssetError.
     """
+    import numpy as np
     import OpenImageIO as oiio
+
+    from glshade.srgb import srgb_to_linear
 
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)

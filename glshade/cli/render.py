@@ -231,18 +231,19 @@ def command(
         folder = os.path.commonpath([os.path.abspath(os.path.dirname(task.output)) for task in tasks])
         manifest = Path(os.path.relpath(folder)) / "manifest.jsonl"
 
-    from glshade.batch import leftovers
-    from glshade.batch.maker import Maker
-    from glshade.batch.manifest import Manifest
-    from glshade.batch.run import run
-    from glshade.cli._progress import progress
-
     with ExitStack() as stack:
-        shown = progress(as_json, several, str(manifest) if manifest else None)
         workers = None
         if several and wanted:
-            # They start while this process looks at the scenes.
+            # They start while this process imports what it takes to look at the scenes, and does.
             workers = stack.enter_context(_workers(cluster, jobs, len(wanted), backend, device, reference, retries))
+
+        from glshade.batch import leftovers
+        from glshade.batch.maker import Maker
+        from glshade.batch.manifest import Manifest
+        from glshade.batch.run import run
+        from glshade.cli._progress import progress
+
+        shown = progress(as_json, several, str(manifest) if manifest else None)
         maker = Maker(backend, device)
         stack.callback(maker.close)
         first = _checked(wanted, maker, shown)

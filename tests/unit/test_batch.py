@@ -367,6 +367,19 @@ class TestCommand:
         assert all(name.startswith("f.") for name in made)
         assert len(Path("out/manifest.jsonl").read_text().splitlines()) == len(made)
 
+    def test_workers_start_before_anything_is_imported_that_takes_time(self, python: Any, folder: Path) -> None:
+        code = (
+            "import sys; from glshade.batch import pool; from glshade.cli import run\n"
+            "start = pool.Process.__init__\n"
+            "def seen(*given, **named):\n"
+            "    print(sorted({'numpy', 'pydantic', 'moderngl', 'OpenImageIO'} & set(sys.modules)))\n"
+            "    start(*given, **named)\n"
+            "pool.Process.__init__ = seen\n"
+            "sys.argv = 'glshade render s.toml -f 1-2 -o f.#.png --jobs 1'.split()\n"
+            "run()"
+        )
+        assert python(code, cwd=folder).splitlines()[0] == "[]"
+
     def test_a_warning_is_said_once(self, run: Any, folder: Path) -> None:
         (folder / "s.toml").write_text(SCENE.replace('"phong"', '"phong", alpha_mode = "blend", alpha = 0.5'))
         done = run("-f", "1-8", "-o", "f.#.png", "--jobs", "2")
