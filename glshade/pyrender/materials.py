@@ -70,6 +70,8 @@ def _state(value: Any) -> Any:
     return value if isinstance(value, str | int | float | bool | None) else id(value)
 
 
+# What notes on materials begin with, as those of a file begin with its path.
+ORIGIN = "pyrender"
 # Factors have up to 4 numbers, and may be changed in place.
 LARGEST_FACTOR = 4
 
@@ -168,10 +170,11 @@ def _seen_through(alpha: float, texture: Any, primitive: Any) -> bool:
 
 def _modelled(table: dict[str, Any], header: dict[str, Any], flat: bool, both: bool, said: list[str]) -> Brdf:
     """The model of a glTF material. Errors: SceneError."""
-    notes = File(Path("pyrender"), Path("/"), b"")
+    notes = File(Path(ORIGIN), Path("/"), b"")
     keys = gltf_material.material(notes, header, [], table)
     keys["sides"] = "both" if both else "front"
-    said.extend(notes.contents.warnings)
+    # Who shows them says where they are from.
+    said.extend(note.removeprefix(f"{ORIGIN}: ") for note in notes.contents.warnings)
     if isinstance(keys.get("roughness"), dict):
         # pyrender's shader reads roughness from red and metallic from green: it has put glTF's green and blue there.
         keys["roughness"]["channel"] = "r"

@@ -114,6 +114,8 @@ class OffscreenRenderer:
         if wanted & NORMALS:
             self._say("normals are drawn by pyrender's viewer alone; they are left out, as in its offscreen pictures")
         size = (self.viewport_width, self.viewport_height)
+        if min(size) < 1:
+            raise SceneError(f"a viewport of {size[0]} x {size[1]} pixels has no picture: both must be 1 or more")
         seen_from = main_camera(scene, size)
         if seen_from is None:
             raise SceneError("the scene has no camera")

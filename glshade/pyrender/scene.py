@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -49,8 +50,10 @@ def from_pyrender(scene: Any, size: tuple[int, int] = (640, 480)) -> Scene:
     background = np.asarray(scene.bg_color, dtype=np.float64)
     # What pyrender clears with is shown as it is.
     shown = [float(c) for c in srgb_to_linear(background[:3])] + [float(background[3])] * bool(background[3] < 1)
+    objects, materials = _named(found)
     return Scene(
-        objects=tuple(found.objects),
+        objects=objects,
+        materials=materials,
         lights=lights(scene),
         camera=seen_from or Perspective(),
         film=Film(size=size, samples=4, background=tuple(shown)),
@@ -83,10 +86,11 @@ class Look:
 
 @dataclass(eq=False)
 class Converted:
-    """objects: one for every primitive in every instance. wires: the numbers of those drawn as wireframes. notes: what was
-    left out."""
+    """objects: one for every primitive in every instance. names: (its own, its material's) of each, empty where there is none.
+    wires: the numbers of those drawn as wireframes. notes: what was left out."""
 
     objects: list[Object]
+    names: list[tuple[str, str]]
     wires: set[int]
     notes: list[str]
 
@@ -110,7 +114,7 @@ class Conversion:
         eye = np.zeros(3) if scene.main_camera_node is None else scene.get_pose(scene.main_camera_node)[:3, 3]
         placed = [(node, scene.get_pose(node)) for node in nodes if node.mesh.is_visible]
         placed.sort(key=lambda pair: (-float(np.linalg.norm(pair[1][:3, 3] - eye)), pair[0].name or "", pair[1].tobytes()))
-        result = Converted([], set(), [])
+        result = Converted([], [], set(), [])
         last = self._last.get((look.kind, look.both), {})
         now: dict[tuple[Any, ...], tuple[Any, Any]] = {}
 
@@ -147,6 +151,7 @@ class Conversion:
                         if primitive.material.wireframe and coloured:
                             result.wires.add(len(result.objects))
                         result.objects.append(found)
+                        result.names.append((node.name or node.mesh.name or "", primitive.material.name or ""))
         self._last[look.kind, look.both] = now
         return result
 
@@ -166,6 +171,32 @@ def _object(shape: Mesh, made: Brdf, place: Array, coloured: bool) -> Object | N
     rows: Any = tuple(map(tuple, affine_rows(place)))
     transform = Transform.model_construct(matrix=rows)
     return Object.model_construct(mesh=shape, transform=transform, material=made, vertex_colours=coloured)
+
+
+def _named(found: Converted) -> tuple[tuple[Object, ...], dict[str, Brdf]]:
+    """The objects under their names, and their materials."""
+    objects: list[Object] = []
+    materials: dict[str, Brdf] = {}
+    taken: set[str] = set()
+    last: Counter[str] = Counter()
+    for item, (own, of_material) in zip(found.objects, found.names, strict=True):
+        names: dict[str, str] = {}
+        if own:
+            name = own
+            while name in taken:
+                last[own] += 1
+                name = f"{own}.{last[own]}"
+            taken.add(name)
+            names["name"] = name
+        if of_material and isinstance(item.material, Brdf):
+            name, number = of_material, 0
+            # What is made of one material is the same, but for primitives with colours or without texture coordinates.
+            while materials.setdefault(name, item.material) != item.material:
+                number += 1
+                name = f"{of_material}.{number}"
+            names["material"] = name
+        objects.append(item.model_copy(update=names))
+    return tuple(objects), materials
 
 
 # --- lights ----------------------------------------------------------------------------------------------------------

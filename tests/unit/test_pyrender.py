@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import json
 import math
 import os
 import subprocess
@@ -75,9 +76,11 @@ def moved(x: float = 0, y: float = 0, z: float = 0, turn: Any = None) -> Any:
     return pose
 
 
-def node(*primitives: Thing, pose: Any = None, visible: bool = True, name: str | None = None) -> Thing:
+def node(
+    *primitives: Thing, pose: Any = None, visible: bool = True, name: str | None = None, mesh_name: str | None = None
+) -> Thing:
     pose = np.eye(4) if pose is None else pose
-    return Thing(mesh=Thing(primitives=list(primitives), is_visible=visible), pose=pose, name=name)
+    return Thing(mesh=Thing(primitives=list(primitives), is_visible=visible, name=mesh_name), pose=pose, name=name)
 
 
 def perspective(yfov: float = 1.0, aspect: float | None = None, near: float = 0.1, far: float | None = 50.0) -> Thing:
@@ -169,7 +172,7 @@ def test_only_what_lets_light_through_is_blended() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"emissiveFactor": np.ones(3)}, "emission not used"),
+        ({"emissiveFactor": np.ones(3), "name": "lamp"}, "^pyrender: material 'lamp': emission not used"),
         ({"occlusionTexture": texture(np.ones((2, 2)))}, "ambient occlusion not used"),
         ({"wireframe": True}, "wireframes are drawn solid"),
     ],
@@ -234,6 +237,36 @@ def test_instances_and_invisible_meshes() -> None:
     # The third is flattened, and covers nothing.
     places = {tuple(item.transform.array()[:3, 3]) for item in scene.objects}
     assert places == {(1, 0, 3), (0, 2, 3)}
+
+
+def test_names_are_kept_and_numbered() -> None:
+    red, blue = np.array([1.0, 0, 0, 1]), np.array([0, 0, 1.0, 1])
+    paint = rough(name="paint", baseColorFactor=red)
+    scene = from_pyrender(
+        stage(
+            node(square(paint), square(paint), pose=moved(z=0), name="ball", mesh_name="sphere"),
+            node(square(rough(name="paint", baseColorFactor=blue)), pose=moved(z=1), mesh_name="cube"),
+            node(square(), pose=moved(z=2)),
+            node(square(paint), pose=moved(z=3), name="ball.1"),
+        )
+    )
+    assert [item.name for item in scene.objects] == ["ball", "ball.1", "cube", None, "ball.1.1"]
+    assert [item.material for item in scene.objects if isinstance(item.material, str)] == ["paint", "paint", "paint.1", "paint"]
+    assert {name: material.kd for name, material in scene.materials.items()} == {"paint": (1, 0, 0), "paint.1": (0, 0, 1)}
+    film = scene.film.model_copy(update={"aovs": ("object_id", "material_id")})
+    with glshade.Renderer() as renderer:
+        told = renderer.layers(scene.model_copy(update={"film": film})).attributes
+    assert json.loads(told["glshade:object_id"]) == ["ball", "ball.1", "cube", "objects[3]", "ball.1.1"]
+    assert json.loads(told["glshade:material_id"]) == ["paint", "paint.1", "objects[3]"]
+
+
+def test_a_viewport_without_pixels_is_refused() -> None:
+    renderer = OffscreenRenderer(0, 5)
+    with pytest.raises(SceneError, match="0 x 5 pixels"):
+        renderer.render(stage(node(square())))
+    renderer.viewport_width = 8
+    assert renderer.render(stage(node(square())))[1].shape == (5, 8)
+    renderer.delete()
 
 
 def test_lights_keep_their_photometric_units() -> None:
