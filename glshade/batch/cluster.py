@@ -249,6 +249,8 @@ class Cluster:
         self._waiting: Iterator[Task] = iter(())
         self._suspects: deque[Ordered] = deque()
         self._deaths: dict[int, int] = {}
+        # What workers that died had been given.
+        self._spoiled: list[str] = []
         self._stillborn = 0
         # Of the latest parcel: seconds a picture; how many pictures the next has.
         self._each, self._size = 0.0, 1
@@ -268,7 +270,8 @@ class Cluster:
         self._client.close(timeout=CONNECTING)
         if self._local is not None:
             self._close_local(at_once=bool(given))
-            leftovers.remove(given)
+            # Not earlier: a worker that is lost may not have ended, and what runs is left alone.
+            leftovers.remove([*given, *self._spoiled])
 
     def stop(self) -> None:
         """Nothing more is handed out; what is will be finished."""
@@ -378,8 +381,7 @@ class Cluster:
             if self._stillborn > self._retries:
                 raise ContextError(f"the driver ends the process that opens it: {self._stillborn} workers died of it")
             self._send(())
-        if self._local is not None:
-            leftovers.remove(order.task.output for order in parcel.orders)
+        self._spoiled.extend(order.task.output for order in parcel.orders)
         for order in parcel.orders:
             number, output = order.task.number, order.task.output
             self._deaths[number] = self._deaths.get(number, 0) + deaths

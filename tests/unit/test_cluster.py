@@ -201,6 +201,25 @@ def test_a_frame_that_kills_its_worker_fails_alone(scene: Path, expected: dict[s
     assert "0007.png" in failed[0]
 
 
+# What a worker does that is lost before it has ended, in the middle of writing.
+LOST = """if task.frame == 7:
+            from pathlib import Path
+            from glshade.atomic import beside
+            beside(Path(task.output), os.getpid()).touch()
+            os.closerange(3, 1024)
+            time.sleep(0.5)
+            os.kill(os.getpid(), 9)"""
+
+
+@pytest.mark.slow
+def test_a_worker_that_ends_after_it_is_lost_leaves_nothing_behind(scene: Path, tmp_path: Path) -> None:
+    batch = Batch(scene, tmp_path / "out", *LOCAL, "--retries", "0", **workers_do(LOST, tmp_path))
+    code, error = batch.ended()
+    assert code == 1, error
+    assert temporary(batch.folder) == []
+    assert len(contents(batch.folder)) == FRAMES - 1
+
+
 class Dask:
     """A scheduler and a worker process of its command line, on one machine."""
 
