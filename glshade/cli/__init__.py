@@ -42,8 +42,8 @@ class Commands(click.Group):
             sys.stdout.flush()
             return result
         except BrokenPipeError:
-            # Whoever read stdout has closed it (`| head`): nothing more to say, nor to flush at exit. click would exit with 1.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            # Nothing more to say, nor to flush at exit. click would exit with 1.
+            silence()
             return 0
 
     def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
@@ -54,6 +54,11 @@ class Commands(click.Group):
             hint = f'; did you mean "{close[0]}"?' if close else f"; commands: {', '.join(COMMANDS)}"
             raise click.UsageError(f'no command "{args[0]}"{hint}', ctx)
         return super().resolve_command(ctx, args)
+
+
+def silence() -> None:
+    """Whoever read stdout has closed it (`| head`): what is still written goes nowhere."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})

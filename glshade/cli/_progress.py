@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from glshade.cli import silence
+
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
@@ -42,7 +44,7 @@ class Plain:
 
     def path(self, output: str) -> None:
         """A picture that is made."""
-        click.echo(output)
+        self._print(output)
 
     def warn(self, text: str) -> None:
         """A warning, once."""
@@ -66,6 +68,13 @@ class Plain:
     def say(self, text: str) -> None:
         """A line for people."""
         click.echo(f"glshade: {text}", err=True)
+
+    def _print(self, line: str) -> None:
+        """On stdout; once its reader has gone the pictures are made all the same."""
+        try:
+            click.echo(line)
+        except BrokenPipeError:
+            silence()
 
     def _once(self, text: str) -> None:
         if text not in self._said:
@@ -108,7 +117,7 @@ class Bar(Plain):
     def path(self, output: str) -> None:
         """The bar names it."""
         if not sys.stdout.isatty():
-            click.echo(output)
+            self._print(output)
 
     def say(self, text: str) -> None:
         """Above the bar."""
@@ -146,7 +155,7 @@ class Json(Plain):
         self._event("end", counts | seconds)
 
     def _event(self, name: str, values: dict[str, Any]) -> None:
-        click.echo(json.dumps({"event": name, **values}))
+        self._print(json.dumps({"event": name, **values}))
 
 
 def progress(as_json: bool, several: bool, manifest: str | None) -> Plain:

@@ -439,6 +439,14 @@ def test_a_device_that_is_not_there(folder: Path) -> None:
         pool.ready()
 
 
+@pytest.mark.parametrize("options", ["", "--json"])
+def test_a_reader_who_leaves_costs_no_picture(folder: Path, options: str) -> None:
+    command = f"{sys.executable} -m glshade render s.toml -f 1-6 {options} -o 'out/#.png' | head -n 1; echo ${{PIPESTATUS[0]}}"
+    done = subprocess.run(["bash", "-c", command], cwd=folder, capture_output=True, text=True, timeout=60, check=True)
+    assert (done.stdout.splitlines()[1:], done.stderr) == (["0"], "")
+    assert {path.name for path in (folder / "out").glob("*.png")} == {f"{n}.png" for n in range(1, 7)}
+
+
 @pytest.mark.slow
 def test_memory_stays_flat(maker: Maker, folder: Path) -> None:
     """Of a worker that has made 1,000 pictures, and 10,000."""
