@@ -460,7 +460,9 @@ def _started(devices: Sequence[int | None], hardware: bool, shares: bool) -> dis
         for number, device in enumerate(devices)
     }
     # What dies is looked into here, after one death. A worker that is drawing may not answer for minutes.
-    options = {"host": host, "port": 0, "dashboard": False, "allowed_failures": 0}
+    # Any free port for its HTTP server too: of two clusters on a machine the second would warn that it is not the first.
+    free = {"port": 0, "dashboard_address": f"{host}:0"}
+    options = {"host": host, **free, "dashboard": False, "allowed_failures": 0}
     quiet = {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical"}
     with dask.config.set({"distributed.scheduler.worker-ttl": None, **quiet}):
         try:
