@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.brdfs import Brdf
-from glshade.uniforms import widened
+from glshade.brdfs import Brdf, widened
 
 Array = NDArray[np.float64]
 

@@ -126,12 +126,7 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
         instances.append(Instance(name, ready, local, material, rate, back_faces, colours, chosen, quality, number, made_of))
     if problems:
         raise SceneError(problems)
-    assembly = _in_range(Assembly(tuple(instances), tuple(lights), view), np.concatenate(boxes))
-    if any(i.rate == "gouraud" and i.quality.refine for i in instances):
-        from glshade.refinement import refined_assembly
-
-        return refined_assembly(scene, assembly)
-    return assembly
+    return _in_range(Assembly(tuple(instances), tuple(lights), view), np.concatenate(boxes))
 
 
 # Within these the squares of lengths stay well inside float32; scenes beyond are drawn in another unit of length.

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from glshade.assembly import assemble
 from glshade.definitions import uncommented
 from glshade.plan import Plan, ProgramPlan, explain, reasons
+from glshade.readying import ready
 from glshade.scene import Rate, Scene
 from glshade.source import Source, generate
 from glshade.variants import Variants, variants
@@ -118,7 +118,7 @@ class Explanation:
 
 def explanation(scene: Scene, shading: Rate | None = None) -> Explanation:
     """Everything that can be said without a driver. Errors: SceneError."""
-    assembly, plan = assemble(scene, shading), explain(scene, shading)
+    assembly, plan = ready(scene, shading), explain(scene, shading)
     why: list[dict[str, str]] = [{} for _ in plan.programs]
     draws: list[dict[str, None]] = [{} for _ in plan.programs]
     for instance, (name, which) in zip(assembly.instances, plan.draws, strict=True):

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.albedo import albedo
-from glshade.brdfs import Brdf
+from glshade.brdfs import Brdf, widened
 from glshade.fresnel import f0_conductor, f_conductor, f_dielectric, f_schlick
-from glshade.uniforms import widened
 
 Array = NDArray[np.float64]
 Quantity = Literal["f cos", "f"]

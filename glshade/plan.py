@@ -10,18 +10,17 @@ import re
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Literal
 
-import numpy as np
-
-from glshade.assembly import Assembly, Instance, Shows, assemble
-from glshade.brdfs import BRDFS, Array, Brdf
+from glshade.assembly import Assembly, Instance, Shows
+from glshade.brdfs import BRDFS, Brdf
 from glshade.camera import View
 from glshade.lights import Falloff, Light
+from glshade.readying import ready
 from glshade.scene import Rate, Scene
 from glshade.texels import Texels, texels
 from glshade.texture import DirectionMap, Texture
+from glshade.values import ambient_reflectance, turn
 
 # A uniform costs time in every pixel on a software driver, so a colour whose three channels are equal is one number.
 
@@ -313,36 +312,12 @@ def _with_equals(material: Brdf, asked: frozenset[str]) -> frozenset[str]:
     return asked | {declared[name].same_as or name for name in asked if getattr(material, name) is None}
 
 
-def parameter_values(material: Brdf) -> dict[str, Any]:
-    """name -> value, with what is left out filled in."""
-    values = {name: (getattr(material, name), declared.same_as) for name, declared in material.parameters().items()}
-    return {
-        name: getattr(material, same_as) if value is None and same_as else value for name, (value, same_as) in values.items()
-    }
-
-
-def ambient_reflectance(material: Brdf) -> Array:
-    """(3,): what it reflects of ambient light, where it asks for no texture."""
-    values: dict[str, Any] = {}
-    for name, value in parameter_values(material).items():
-        # What does not count may be one all the same: any number stands for it.
-        given = (value.factor if material.is_colour(name) else value.factor[0]) if isinstance(value, Texture) else value
-        values[name] = np.asarray(given, dtype=np.float64)
-    return type(material).ambient_reflectance(SimpleNamespace(**values, **material.chosen()))
-
-
-def turn(material: Brdf) -> float:
-    """How far the tangents, or the directions that take their place, are turned [degrees]."""
-    direction = material.tangent_direction
-    return direction.rotate if isinstance(direction, DirectionMap) else direction
-
-
 def explain(scene: Scene, shading: Rate | None = None) -> Plan:
     """What the programs of a scene hold, and why.
 
     Errors: SceneError.
     """
-    assembly = assemble(scene, shading)
+    assembly = ready(scene, shading)
     film, storage = scene.film, scene.quality.storage
     # What is averaged, blended or added afterwards is drawn in linear light.
     direct = film.direct and storage in (None, "auto")

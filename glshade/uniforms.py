@@ -6,45 +6,22 @@ that the two renderers share their inputs and nothing else.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator
-from contextlib import contextmanager
-from contextvars import ContextVar
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.arrays import _precision, rounded
 from glshade.assembly import Assembly, Instance
 from glshade.brdfs import Brdf
-from glshade.lights import LIGHTS, Falloff, Light
-from glshade.plan import LightGroup, ProgramPlan, ambient_reflectance, channel, turn
-from glshade.plan import parameter_values as parameter_values
+from glshade.brdfs import parameter_values as parameter_values
+from glshade.lights import LIGHTS, Light
+from glshade.plan import LightGroup, ProgramPlan, channel
 from glshade.texels import Texels, texels
-from glshade.texture import Texture
+from glshade.values import ambient_intensity, ambient_reflectance, direction, light_values, normal_matrix
 
 Array = NDArray[np.float64]
 Values = dict[str, NDArray[np.float32]]
-
-
-def rounded(value: Any) -> NDArray[np.float32]:
-    """float32; what is too large for it becomes infinite, and is refused by the renderer."""
-    with np.errstate(over="ignore"):
-        return np.asarray(value, dtype=np.float64).astype(_precision.get())
-
-
-_precision: ContextVar[Any] = ContextVar("precision", default=np.float32)
-
-
-@contextmanager
-def unrounded() -> Iterator[None]:
-    """Within it `rounded` leaves float64 as it is: for the reference alone, to see what rounding the inputs costs."""
-    token = _precision.set(np.float64)
-    try:
-        yield
-    finally:
-        _precision.reset(token)
 
 
 def object_uniforms(plan: ProgramPlan, instance: Instance, eye: Array) -> Values:
@@ -86,12 +63,6 @@ def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
     return values
 
 
-def direction(material: Brdf) -> Array:
-    """(2,): cos and sin of the angle by which tangents are turned."""
-    angle = math.radians(turn(material) % 360)
-    return np.array([math.cos(angle), math.sin(angle)])
-
-
 def textures(plan: ProgramPlan, material: Brdf) -> dict[str, Texels]:
     """sampler name -> what it samples."""
     found = {f"u_{plan.picture_of(name)}_texture": texels(material, name) for name in plan.textured}
@@ -104,77 +75,10 @@ def textures(plan: ProgramPlan, material: Brdf) -> dict[str, Texels]:
     return found
 
 
-def normal_matrix(linear: Array) -> Array:
-    """(3, 3): the direction of the inverse transpose, as the cofactor matrix over its largest entry.
-
-    The sign of the determinant keeps normals on the outside of mirrored objects. Scaled first, so that 1e-200 does not vanish.
-    """
-    # Plain numbers: numpy takes twenty times as long for nine.
-    (a, b, c), (d, e, f), (g, h, i) = (linear / np.abs(linear).max()).tolist()
-    cofactors = np.array(
-        [
-            [e * i - f * h, f * g - d * i, d * h - e * g],
-            [h * c - i * b, i * a - g * c, g * b - h * a],
-            [b * f - c * e, c * d - a * f, a * e - b * d],
-        ]
-    )
-    sign = math.copysign(1.0, a * cofactors[0, 0] + b * cofactors[0, 1] + c * cofactors[0, 2])
-    result: Array = sign * cofactors / np.abs(cofactors).max()
-    return result
-
-
-def light_values(light: Light, eye: Array, exposure: float) -> dict[str, NDArray[np.float32]]:
-    """The GLSL struct's fields. The intensity comes with exposure, and with the pi of pi (f cos) I."""
-    values = light.uniforms(eye)
-    gain = 2.0**exposure * (1.0 if light.omnidirectional else math.pi)
-    values["intensity"] = values["intensity"] * gain
-    if "r_min" in values:
-        # float32 ends at 3e38, and infinite light from no direction would be NaN.
-        strongest = float(np.abs(values["intensity"]).max())
-        values["r_min"] = max(values["r_min"], least_distance(strongest, getattr(light, "falloff", "none")))
-    return {name: rounded(value) for name, value in values.items()}
-
-
-# The strongest light that a point is given.
-BRIGHTEST = 1e38
-FALLOFF_POWERS: dict[Falloff, int] = {"none": 0, "1/r": 1, "1/r^2": 2}
-
-
-def least_distance(strength: float, falloff: Falloff) -> float:
-    """The r_min [scene units] below which light of that strength exceeds BRIGHTEST: 2e-19 for 1/r^2 and a strength of 4."""
-    power = FALLOFF_POWERS[falloff]
-    # 4e-38 is the least: a normal number, as is its inverse.
-    return (max(strength, 4.0) / BRIGHTEST) ** (1 / power) if power else 0.0
-
-
-def ambient_intensity(assembly: Assembly, chosen: tuple[int, ...], exposure: float) -> Array:
-    """(3,) float64: ambient lights add up before they are rounded."""
-    total = np.zeros(3)
-    for index in chosen:
-        light = assembly.lights[index]
-        if light.omnidirectional:
-            total += light.uniforms(assembly.view.eye)["intensity"] * 2.0**exposure
-    return total
-
-
 def ambient_radiance(instance: Instance, assembly: Assembly, exposure: float) -> Values:
     """What ambient light adds to a surface of one colour."""
     intensity = ambient_intensity(assembly, instance.lights, exposure)
     return {"u_ambient_radiance": rounded(ambient_reflectance(instance.material) * intensity)}
-
-
-def numbers(brdf: Brdf) -> Values:
-    """name -> value of a material without textures, as the GPU gets it. Errors: ValueError for a texture."""
-    values = parameter_values(brdf)
-    for name, value in values.items():
-        if isinstance(value, Texture):
-            raise ValueError(f"{name} is a texture where a number is needed")
-    return {name: rounded(value) for name, value in values.items()}
-
-
-def widened(brdf: Brdf) -> SimpleNamespace:
-    """The same numbers in float64, with the choices: what `Brdf.brdf_cos` takes. Errors: ValueError for a texture."""
-    return SimpleNamespace(**{name: value.astype(np.float64) for name, value in numbers(brdf).items()}, **brdf.chosen())
 
 
 def light_uniforms(plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...], exposure: float) -> Values:

@@ -22,6 +22,7 @@ import moderngl
 import numpy as np
 
 from glshade import BRDFS, Renderer, Scene
+from glshade.arrays import rounded
 from glshade.assembly import Assembly, Instance
 from glshade.brdfs import Brdf
 from glshade.definitions import definitions
@@ -32,7 +33,8 @@ from glshade.plan import ProgramPlan
 from glshade.source import FALLOFFS, SHADERS, Source, expand
 from glshade.texels import texels
 from glshade.texture import Texture
-from glshade.uniforms import ambient_intensity, light_values, object_uniforms, parameter_values, rounded, textures
+from glshade.uniforms import object_uniforms, parameter_values, textures
+from glshade.values import ambient_intensity, light_values
 
 # Lights of one kind at most.
 LIGHTS_OF_A_KIND = 8

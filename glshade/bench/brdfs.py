@@ -14,13 +14,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from glshade.brdfs import BRDFS, Brdf
+from glshade.brdfs import BRDFS, Brdf, numbers
 from glshade.gl.census import Operations, censuses
 from glshade.gl.clock import Spread, on_cpu
 from glshade.gl.context import Backend, open_context
 from glshade.gl.workload import Workload
 from glshade.source import Source, Stage, expand
-from glshade.uniforms import numbers
 
 REPEAT = 7
 # The model of the program that is taken off. Adding a model's value to those before it is the model's.

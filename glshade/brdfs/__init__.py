@@ -9,6 +9,7 @@ from copy import deepcopy
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from pydantic import Discriminator, Field, GetJsonSchemaHandler, Tag, ValidationInfo, field_validator
 from pydantic_core import CoreSchema
 
+from glshade.arrays import rounded
 from glshade.document import Document, Finite, Triple, fault
 from glshade.found import Found
 from glshade.texture import BumpMap, DirectionMap, NormalMap, Picture, Texture
@@ -283,3 +285,25 @@ def above_horizon(l: Array, v: Array, value: Array) -> Array:
 
 
 BRDFS: Found[Brdf] = Found("glshade.brdfs", Path(__file__).parent)
+
+
+def numbers(brdf: Brdf) -> dict[str, NDArray[np.float32]]:
+    """name -> value of a material without textures, as the GPU gets it. Errors: ValueError for a texture."""
+    values = parameter_values(brdf)
+    for name, value in values.items():
+        if isinstance(value, Texture):
+            raise ValueError(f"{name} is a texture where a number is needed")
+    return {name: rounded(value) for name, value in values.items()}
+
+
+def widened(brdf: Brdf) -> SimpleNamespace:
+    """The same numbers in float64, with the choices: what `Brdf.brdf_cos` takes. Errors: ValueError for a texture."""
+    return SimpleNamespace(**{name: value.astype(np.float64) for name, value in numbers(brdf).items()}, **brdf.chosen())
+
+
+def parameter_values(material: Brdf) -> dict[str, Any]:
+    """name -> value, with what is left out filled in."""
+    values = {name: (getattr(material, name), declared.same_as) for name, declared in material.parameters().items()}
+    return {
+        name: getattr(material, same_as) if value is None and same_as else value for name, (value, same_as) in values.items()
+    }

@@ -8,11 +8,10 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from glshade.brdfs import BRDFS, Brdf
+from glshade.brdfs import BRDFS, Brdf, numbers, widened
 from glshade.gl.context import Context, open_context
 from glshade.gl.program import Program
 from glshade.source import Source, expand
-from glshade.uniforms import numbers, widened
 
 On = Literal["reference", "vertex", "fragment"]
 

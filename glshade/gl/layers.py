@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from glshade import cryptomatte
-from glshade.assembly import Assembly, assemble
+from glshade.assembly import Assembly
+from glshade.image import Image
 from glshade.layers import Layers, names_attribute
 from glshade.part import Part
+from glshade.readying import ready
 from glshade.scene import Film, Rate, Scene
-
-if TYPE_CHECKING:
-    from glshade.gl.renderer import DType, Renderer
 
 Array = NDArray[np.float32]
 Numbers = NDArray[np.int32]
@@ -25,7 +25,19 @@ Made = dict[str, Array]
 POINTS = 4
 
 
-def layers(renderer: Renderer, scene: Scene, dtype: DType, shading: Rate | None, tile: int | None) -> Layers:
+class Draws(Protocol):
+    """What the layers ask of a Renderer."""
+
+    @property
+    def render(self) -> Callable[..., Image]:
+        """Draws the picture of a scene."""
+
+    @property
+    def shown(self) -> Callable[..., Iterator[Array]]:
+        """Draws a part of a scene, (H, W, 4) float32: once, or once for each offset."""
+
+
+def layers(renderer: Draws, scene: Scene, dtype: str, shading: Rate | None, tile: int | None) -> Layers:
     """The picture of a scene and the layers that its film asks for. Errors: SceneError, ShaderError."""
     image = renderer.render(scene, dtype=dtype, shading=shading, tile=tile)
     if not scene.film.aovs:
@@ -37,7 +49,7 @@ def layers(renderer: Renderer, scene: Scene, dtype: DType, shading: Rate | None,
     return Layers(image, arrays, maker.attributes)
 
 
-def surfaces(renderer: Renderer, scene: Scene) -> tuple[Array, Numbers]:
+def surfaces(renderer: Draws, scene: Scene) -> tuple[Array, Numbers]:
     """(depth (H, W), number (H, W)) at the middle of every pixel, row 0 at the top.
 
     depth: along the view axis [scene units], 0 where nothing is. number: of the scene's objects, which one; -1 where nothing
@@ -52,9 +64,9 @@ def surfaces(renderer: Renderer, scene: Scene) -> tuple[Array, Numbers]:
 class _Maker:
     """Makes the layers of one scene: a method each, by the layer's name."""
 
-    def __init__(self, renderer: Renderer, scene: Scene, shading: Rate | None, tile: int | None) -> None:
+    def __init__(self, renderer: Draws, scene: Scene, shading: Rate | None, tile: int | None) -> None:
         self._renderer, self._scene, self._shading, self._tile = renderer, scene, shading, tile
-        self.assembly = assemble(scene, shading)
+        self.assembly = ready(scene, shading)
         self.attributes: dict[str, str] = {}
 
     def _draw(self, part: Part) -> Array:

@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade import __version__
-from glshade.assembly import Assembly, Instance, assemble
+from glshade.arrays import rounded
+from glshade.assembly import Assembly, Instance
 from glshade.camera import window
 from glshade.clusters import facing
 from glshade.digest import digest
@@ -29,18 +30,11 @@ from glshade.gl.textures import upload
 from glshade.gl.vertices import Vertices
 from glshade.image import Image
 from glshade.plan import ProgramPlan, plan_instance
+from glshade.readying import ready
 from glshade.scene import Film, Rate, Scene
 from glshade.source import PAGE, Source, expand, generate
 from glshade.texels import Texels
-from glshade.uniforms import (
-    Values,
-    ambient_radiance,
-    light_pages,
-    light_uniforms,
-    object_uniforms,
-    rounded,
-    textures,
-)
+from glshade.uniforms import Values, ambient_radiance, light_pages, light_uniforms, object_uniforms, textures
 
 if TYPE_CHECKING:
     from glshade.layers import Layers
@@ -344,8 +338,7 @@ class Renderer:
         key = (id(scene), shading, encoding, part)
         kept = self._prepared.get(key)
         if kept is None:
-            assembly = assemble(scene, shading)
-            assembly = part.of(assembly) if part else assembly
+            assembly = ready(scene, shading, part)
             kept = Prepared(scene, assembly, list(self._draws(scene, assembly, encoding)))
             self._prepared[key] = kept
             if len(self._prepared) > KEPT_SCENES:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, get_args
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,19 +16,17 @@ from glshade.atomic import replacing
 from glshade.brdfs import Brdf
 from glshade.errors import GlshadeError, MissingLibrary
 from glshade.lobe import Quantity
+from glshade.plots.pictures import DRAWN as DRAWN
+from glshade.plots.pictures import KINDS as KINDS
+from glshade.plots.pictures import PICTURES as PICTURES
+from glshade.plots.pictures import Kind as Kind
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from glshade.gl.renderer import Renderer
+    from glshade.plots.sheet import Scale as Scale
 
-Kind = Literal["polar", "lobe", "sphere", "furnace", "albedo", "fresnel"]
-KINDS: tuple[Kind, ...] = get_args(Kind)
-# Those that glshade draws itself, on the GPU.
-DRAWN: frozenset[Kind] = frozenset({"lobe", "sphere"})
-# Those that are pictures, without axes.
-PICTURES: frozenset[Kind] = DRAWN | {"furnace"}
-Scale = Literal["auto", "linear", "log"]
 SUFFIXES = (".pdf", ".png", ".svg")
 ANGLES = tuple(float(angle) for angle in np.radians((0.0, 30.0, 60.0, 80.0)))
 INCIDENCE = float(np.radians(45.0))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,12 @@ from glshade.srgb import linear_to_srgb
 
 Array = NDArray[np.float64]
 Scale = Literal["linear", "log"]
+Kind = Literal["polar", "lobe", "sphere", "furnace", "albedo", "fresnel"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
+# Those that glshade draws itself, on the GPU.
+DRAWN: frozenset[Kind] = frozenset({"lobe", "sphere"})
+# Those that are pictures, without axes.
+PICTURES: frozenset[Kind] = DRAWN | {"furnace"}
 
 # A log scale shows this many decades below the largest value.
 DECADES = 4

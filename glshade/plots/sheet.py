@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import matplotlib.style
 import numpy as np
@@ -17,13 +17,14 @@ from numpy.typing import NDArray
 
 from glshade import lobe
 from glshade.brdfs import Brdf
-from glshade.plots import Kind, Scale, pictures
-from glshade.plots.pictures import DECADES, shown
+from glshade.plots import pictures
+from glshade.plots.pictures import DECADES, Kind, shown
 
 if TYPE_CHECKING:
     from glshade.gl.renderer import Renderer
 
 Array = NDArray[np.float64]
+Scale = Literal["auto", "linear", "log"]
 
 # Okabe and Ito 2008: told apart with any colour vision. Yellow is left out: it is too pale for a line on white.
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from glshade.camera import View
 from glshade.mesh import Mesh
-from glshade.uniforms import normal_matrix
+from glshade.values import normal_matrix
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from glshade.arrays import rounded
 from glshade.assembly import Assembly
 from glshade.camera import View
 from glshade.errors import SceneError
@@ -17,7 +18,6 @@ from glshade.gl.renderer import Draw, Prepared, Renderer
 from glshade.pyrender.canvas import Canvas
 from glshade.scene import Film, Object, Scene
 from glshade.source import PAGE
-from glshade.uniforms import rounded
 
 if TYPE_CHECKING:
     from glshade.lights import Light

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 
 from glshade.image import Image
 from glshade.part import Part
+from glshade.radiance.draw import Draw
 from glshade.reference.bounds import LLVMPIPE, Bounds, Driver, alphas, bounds, depth_slack, driver_of, sealed, turnable
-from glshade.reference.inputs import Draw, Inputs, prepare
+from glshade.reference.inputs import Inputs, prepare
 from glshade.reference.raster import MARGIN, Fragments, rasterise, resolve
 from glshade.reference.shade import AT_CENTRE, Sampling, is_there, opacity, shade
 from glshade.scene import Rate, Scene

@@ -15,22 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.radiance.draw import Draw
+from glshade.radiance.surface import Surface, alpha_of, at_vertices, material_of, shown, toward_viewer
 from glshade.reference import clip
-from glshade.reference.inputs import Draw, Inputs
+from glshade.reference.inputs import Inputs
 from glshade.reference.interpolate import blend, weights
 from glshade.reference.raster import MARGIN, SUBPIXELS, Fragments
-from glshade.reference.shade import (
-    AT_CENTRE,
-    Surface,
-    alpha_of,
-    at_vertices,
-    by_draw,
-    material_of,
-    places,
-    shown,
-    surface_at,
-    toward_viewer,
-)
+from glshade.reference.shade import AT_CENTRE, by_draw, places, surface_at
 
 Array = NDArray[Any]
 

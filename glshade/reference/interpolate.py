@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.reference.inputs import Draw
+from glshade.radiance.draw import Draw
 
 Array = NDArray[np.float64]
 

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.radiance.draw import Draw
 from glshade.reference import clip
-from glshade.reference.inputs import Draw, Inputs
+from glshade.reference.inputs import Inputs
 from glshade.reference.interpolate import weights
 
 Array = NDArray[np.float64]

@@ -10,6 +10,7 @@ from typing import Any
 from glshade.assembly import assemble
 from glshade.plan import plan_instance
 from glshade.quality import Quality
+from glshade.readying import ready
 from glshade.scene import Scene
 from glshade.source import generate
 
@@ -135,7 +136,7 @@ def _combinations(scene: Scene, wanted: tuple[str, ...]) -> Iterator[Setting]:
 
 def _made(scene: Scene, setting: Setting) -> Any:
     """All that a picture is drawn from, but for what it is kept in: equal for settings that cannot differ."""
-    assembly = assemble(setting.applied(scene))
+    assembly = ready(setting.applied(scene))
     return tuple(
         (generate(plan_instance(i, assembly, "linear")), i.material, i.mesh.digest, i.back_faces) for i in assembly.instances
     )

@@ -19,14 +19,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade import __version__, reference
-from glshade.assembly import assemble
+from glshade.arrays import unrounded
 from glshade.atomic import replacing
 from glshade.digest import digest
+from glshade.readying import ready
 from glshade.scene import Scene
 from glshade.tradeoff.front import Timing, dominated
 from glshade.tradeoff.metrics import METRICS, Errors, errors
 from glshade.tradeoff.setting import EXACT, Setting, space
-from glshade.uniforms import unrounded
 from glshade.verifier import surfaces
 
 if TYPE_CHECKING:
@@ -210,7 +210,7 @@ def study(
         timings = dict(zip((EXACT, *others), times, strict=True))
         for setting in batch:
             total, kinds = pictures.errors(setting)
-            vertices = sum(len(i.mesh.positions) for i in assemble(setting.applied(scene)).instances)
+            vertices = sum(len(i.mesh.positions) for i in ready(setting.applied(scene)).instances)
             found[setting] = Point(setting, timings[setting], vertices, total, kinds)
             progress(str(setting), len(found), len(order))
         _keep(kept, head, found)

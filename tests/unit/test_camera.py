@@ -13,8 +13,8 @@ from hypothesis.extra import numpy as hnp
 from strategies import fitted_cameras, transforms
 
 from glshade import Orthographic, Perspective, Scene
-from glshade.assembly import assemble
 from glshade.camera import CAMERAS, View, window
+from glshade.readying import ready
 
 CUBE = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 ASPECTS = st.sampled_from([0.01, 0.5, 1.0, 16 / 9, 100.0])
@@ -49,7 +49,7 @@ def test_a_fitted_camera_sees_every_vertex_of_a_scene(camera: Any, transform: An
         {"name": "a", "shape": "torus", "transform": parent},
         {"shape": {"type": "icosphere", "subdivisions": 1}, "parent": "a", "transform": transform},
     ]
-    assembly = assemble(Scene(objects=objects, camera=camera, film={"size": (160, 90)}))
+    assembly = ready(Scene(objects=objects, camera=camera, film={"size": (160, 90)}))
     for instance in assembly.instances:
         world = instance.mesh.positions @ instance.world_from_object[:3, :3].T + instance.world_from_object[:3, 3]
         frames(assembly.view, world.astype(np.float64))

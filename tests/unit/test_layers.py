@@ -394,13 +394,13 @@ def test_every_layer_is_explained() -> None:
 
 @pytest.mark.parametrize("shading", [None, "flat", "gouraud"])
 def test_parts_hold_only_what_they_use(renderer: g.Renderer, scene: Any, shading: Any) -> None:
-    from glshade.assembly import assemble
     from glshade.explanation import active, declared
     from glshade.plan import plan_instance
+    from glshade.readying import ready
     from glshade.source import generate
 
     for kind in ("depth", "uv", "normal"):
-        assembly = Part(kind).of(assemble(scene(), shading))  # type: ignore[arg-type]
+        assembly = Part(kind).of(ready(scene(), shading))  # type: ignore[arg-type]
         for source in {generate(plan_instance(one, assembly, "linear")) for one in assembly.instances}:
             assert declared(source).names == active(source, renderer.context).names, (kind, source.vertex.text)
             text = source.vertex.text + (source.fragment.text if source.fragment else "")

@@ -16,9 +16,9 @@ from pydantic import ValidationError
 
 import glshade
 from glshade import BRDFS, Scene
-from glshade.assembly import assemble
 from glshade.digest import digest
 from glshade.presets import PRESETS, preset
+from glshade.readying import ready
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "script"))
@@ -31,7 +31,7 @@ def scene(material: Any, **more: Any) -> Scene:
 
 
 def drawn(of: Scene) -> Any:
-    return assemble(of).instances[0].material
+    return ready(of).instances[0].material
 
 
 def fault(material: Any, **more: Any) -> tuple[str, str]:

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import glshade
-from glshade.assembly import assemble
 from glshade.brdfs import BRDFS
 from glshade.errors import SceneError
 from glshade.image import Image
 from glshade.plan import explain
 from glshade.quality import Quality
+from glshade.readying import ready
 from glshade.scene import Scene
 
 Array = np.ndarray[Any, Any]
@@ -73,7 +73,7 @@ class TestReach:
     def test_an_objects_own_comes_before_the_scenes_and_that_before_the_objects_shading(self) -> None:
         objects = [ball(shading="flat", quality={"shading": "phong"}), ball(shading="flat", quality={"subdivide": 2}), ball()]
         scene = Scene.model_validate({"objects": objects, "quality": {"shading": "gouraud", "subdivide": 1}})
-        found = assemble(scene).instances
+        found = ready(scene).instances
         assert [i.rate for i in found] == ["phong", "gouraud", "gouraud"]
         # Per pixel there is nothing to be cut for.
         assert [len(i.mesh.triangles) for i in found] == [320, 320 * 16, 320 * 4]
@@ -117,7 +117,7 @@ class TestSays:
             off = np.abs(draw.renderer.render(scene, dtype="float32").pixels - exact).max()
             assert off < 1.5 * tolerance
             # To a quarter of the tolerance the half of the edge: uniformly cut, this error takes far more.
-            assert len(assemble(scene).instances[0].mesh.triangles) < 320 * 4**4
+            assert len(ready(scene).instances[0].mesh.triangles) < 320 * 4**4
 
     def test_normals_as_they_are_interpolated_are_short(self, draw: Any) -> None:
         matte = ball({"brdf": "lambert", "kd": 1})
@@ -265,7 +265,7 @@ def test_what_cannot_show_changes_nothing(case: str, draw: Any) -> None:
     quality, material, shading, lights = INERT[case]
     plain, chosen = (draw.scene([ball(material, shading)], lights, quality=q) for q in ({}, quality))
     assert explain(plain).programs == explain(chosen).programs
-    one, other = (assemble(scene).instances[0] for scene in (plain, chosen))
+    one, other = (ready(scene).instances[0] for scene in (plain, chosen))
     assert (one.mesh.digest, one.material) == (other.mesh.digest, other.material)
 
 

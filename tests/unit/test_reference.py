@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from glshade import Image, Mesh, Renderer, Scene, reference
 from glshade.primitives import plane, sphere, torus
+from glshade.radiance.sampler import Sampler
 from glshade.reference import clip
 from glshade.reference.raster import Fragments
-from glshade.reference.texturing import Sampler
 
 Array = NDArray[np.float64]
 # Uniforms are float32: this is the pi that the renderers are given.

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glshade import primitives, subdivision
-from glshade.assembly import assemble
 from glshade.mesh import Mesh, face_normals, faceted, weld, with_normals, with_tangents
+from glshade.readying import ready
 from glshade.subdivision import Edges, refined, split, subdivided
 
 Array = np.ndarray[Any, Any]
@@ -233,7 +233,7 @@ class TestInAScene:
             ],
             [KEY],
         )
-        counts = [len(i.mesh.triangles) for i in assemble(scene).instances]
+        counts = [len(i.mesh.triangles) for i in ready(scene).instances]
         assert counts[0] == counts[2] == counts[3] == 320
         assert counts[1] > 400
 
@@ -244,7 +244,7 @@ class TestInAScene:
             """Where most vertices are."""
             light = {**KEY, "direction": direction}
             scene = draw.scene([ball], [light], quality={"refine": 0.01}, camera={"type": "orthographic", "eye": [0, 0, 5]})
-            return np.asarray(np.median(assemble(scene).instances[0].mesh.positions, axis=0))
+            return np.asarray(np.median(ready(scene).instances[0].mesh.positions, axis=0))
 
         assert highlight([-0.6, 0, -0.8])[0] > 0.1
         assert highlight([0.6, 0, -0.8])[0] < -0.1

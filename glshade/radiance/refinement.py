@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from glshade.assembly import Assembly, Instance
 from glshade.mesh import Mesh, ordered
-from glshade.reference.inputs import Draw, draw_of
-from glshade.reference.shade import at_vertices, shown, toward_viewer
+from glshade.radiance.draw import Draw, draw_of
+from glshade.radiance.surface import at_vertices, shown, toward_viewer
 from glshade.scene import Scene
 from glshade.subdivision import refined
 

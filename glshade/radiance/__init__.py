@@ -1,0 +1,1 @@
+"""Radiance: float64 light at points of a surface."""
