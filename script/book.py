@@ -21,7 +21,7 @@ from glshade.presets import PRESETS
 
 if TYPE_CHECKING:
     from glshade.bench.brdfs import Cost, Costs
-    from glshade.image import Image
+    from glshade.image.image import Image
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "brdfs.md"
@@ -298,7 +298,7 @@ def pictures() -> None:
     import numpy as np
 
     from glshade import Image, Renderer, Scene
-    from glshade.plots import pictures as drawn
+    from glshade.catalogue import pictures as drawn
 
     PICTURES.mkdir(parents=True, exist_ok=True)
     lights = Scene.model_validate({"objects": [{"shape": "sphere"}], "lights": LIGHTS}).lights

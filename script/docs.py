@@ -8,15 +8,15 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from glshade.animation import Track
 from glshade.brdfs import BRDFS, Brdf
-from glshade.camera import CAMERAS, Camera
 from glshade.document import Document
 from glshade.lights import LIGHTS, Light
-from glshade.quality import Quality
-from glshade.scene import Film, Object, Scene, Transform
-from glshade.shape import SHAPES
-from glshade.texture import BumpMap, DirectionMap, NormalMap, Texture
+from glshade.scene.animation import Track
+from glshade.scene.camera import CAMERAS, Camera
+from glshade.scene.quality import Quality
+from glshade.scene.scene import Film, Object, Scene, Transform
+from glshade.scene.shape import SHAPES
+from glshade.textures.texture import BumpMap, DirectionMap, NormalMap, Texture
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "scene-file.md"

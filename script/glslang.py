@@ -15,13 +15,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import get_args
 
-from glshade.assembly import assemble
+from glshade.assembly.assembly import assemble
 from glshade.brdfs import BRDFS
-from glshade.gl.evaluate import generated
+from glshade.gl.evaluation import generated
+from glshade.glsl.generator import Source, expand, generate
+from glshade.glsl.plan import LightGroup, ProgramPlan, Viewer, plan
 from glshade.lights import LIGHTS
-from glshade.plan import LightGroup, ProgramPlan, Viewer, plan
-from glshade.scene_file import load
-from glshade.source import Source, expand, generate
+from glshade.scene.file import load
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "tests"))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from glshade.atomic import replacing
+from glshade.files import replacing
 
 
 def table(heading: Sequence[str], rows: Iterable[Sequence[object]]) -> str:

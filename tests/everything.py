@@ -23,18 +23,18 @@ import numpy as np
 
 from glshade import BRDFS, Renderer, Scene
 from glshade.arrays import rounded
-from glshade.assembly import Assembly, Instance
+from glshade.assembly.assembly import Assembly, Instance
+from glshade.assembly.values import ambient_intensity, light_values
 from glshade.brdfs import Brdf
-from glshade.definitions import definitions
 from glshade.gl.renderer import Draw
+from glshade.glsl.definitions import definitions
+from glshade.glsl.generator import FALLOFFS, SHADERS, Source, expand
+from glshade.glsl.plan import ProgramPlan
+from glshade.glsl.uniforms import object_uniforms, parameter_values, textures
 from glshade.lights import LIGHTS
-from glshade.mesh import Mesh, with_tangents
-from glshade.plan import ProgramPlan
-from glshade.source import FALLOFFS, SHADERS, Source, expand
-from glshade.texels import texels
-from glshade.texture import Texture
-from glshade.uniforms import object_uniforms, parameter_values, textures
-from glshade.values import ambient_intensity, light_values
+from glshade.mesh.mesh import Mesh, with_tangents
+from glshade.textures.texels import texels
+from glshade.textures.texture import Texture
 
 # Lights of one kind at most.
 LIGHTS_OF_A_KIND = 8

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from glshade import Mesh, Renderer, Scene, reference
 from glshade.reference import Fragments, Sampling
-from glshade.scene import Rate
+from glshade.scene.scene import Rate
 
 Array = NDArray[np.float64]
 

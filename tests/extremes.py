@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from glshade import BRDFS, Renderer, evaluate
 from glshade.arrays import rounded
 from glshade.brdfs import Brdf, Parameter
-from glshade.uniforms import parameter_values
+from glshade.glsl.uniforms import parameter_values
 
 Array = NDArray[np.float64]
 Stage = Literal["vertex", "fragment"]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from glshade import Renderer
 from glshade.gl.program import Program
-from glshade.source import Source, expand
+from glshade.glsl.generator import Source, expand
 
 
 def called(text: str, renderer: Renderer, a: Any, b: Any) -> NDArray[np.float32]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from glshade import BRDFS, LIGHTS, Scene
 from glshade.brdfs import Brdf, Parameter
-from glshade.shape import SHAPES as PRIMITIVES
+from glshade.scene.shape import SHAPES as PRIMITIVES
 
 
 def numbers(low: float, high: float) -> st.SearchStrategy[float]:

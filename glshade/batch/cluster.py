@@ -24,7 +24,6 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, TypedDict
 from uuid import uuid4
 
-from glshade import __version__
 from glshade.batch import leftovers
 from glshade.batch.digest import code
 from glshade.batch.maker import Drawn, Maker
@@ -33,6 +32,7 @@ from glshade.batch.record import Record
 from glshade.batch.task import Task
 from glshade.batch.worker import SOFTWARE, WRITERS, fault
 from glshade.errors import ContextError, GlshadeError, MissingLibrary
+from glshade.version import __version__
 
 if TYPE_CHECKING:
     import distributed

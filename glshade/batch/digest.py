@@ -8,11 +8,12 @@ import os
 from functools import cache
 from pathlib import Path
 
-from glshade import __version__, picture_file
 from glshade.batch.task import Task
-from glshade.digest import digest as scene_digest
-from glshade.scene import Scene
-from glshade.source import SHADERS
+from glshade.glsl.generator import SHADERS
+from glshade.image import file as picture_file
+from glshade.scene.digest import digest as scene_digest
+from glshade.scene.scene import Scene
+from glshade.version import __version__
 
 # The name under which a picture's file says it.
 ATTRIBUTE = "glshade:digest"

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator
 from glshade.batch.maker import Maker
 from glshade.batch.record import Record
 from glshade.batch.task import Task
-from glshade.scene import Scene
+from glshade.scene.scene import Scene
 
 
 class Here:

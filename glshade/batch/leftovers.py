@@ -7,7 +7,7 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from glshade.atomic import beside
+from glshade.files import beside
 
 NUMBER = re.compile(r"\.(\d+)(?=\.\w+$)")
 

@@ -17,15 +17,15 @@ from glshade.batch.digest import ATTRIBUTE, digest, digest_of
 from glshade.batch.record import Record
 from glshade.batch.task import Task
 from glshade.errors import GlshadeError, SceneError
-from glshade.image import Image
-from glshade.picture_file import FLOAT_SUFFIXES
-from glshade.scene import Film, Scene
-from glshade.scene_file import SceneFile
+from glshade.image.file import FLOAT_SUFFIXES
+from glshade.image.image import Image
+from glshade.scene.file import SceneFile
+from glshade.scene.scene import Film, Scene
 
 if TYPE_CHECKING:
     from glshade.gl.context import Backend
     from glshade.gl.renderer import Renderer
-    from glshade.layers import Layers
+    from glshade.image.layers import Layers
 
 # What a picture may fail by without being a fault in glshade.
 FAULTS = (GlshadeError, OSError, MemoryError)
@@ -105,8 +105,8 @@ class Maker:
         linear = Path(task.output).suffix.lower() in FLOAT_SUFFIXES
         shading = cast(Any, task.shading)
         if task.reference:
+            from glshade.image.view import shown
             from glshade.reference import render
-            from glshade.view_transform import shown
 
             if scene.film.aovs:
                 raise SceneError(f"{task.scene}: film.aovs: the reference draws the picture alone, without layers")
@@ -182,7 +182,7 @@ def _files(task: Task, scene: Scene) -> list[Path]:
     output = Path(task.output)
     if not scene.film.aovs or output.suffix.lower() == ".exr":
         return [output]
-    from glshade.layers import beside
+    from glshade.image.layers import beside
 
     return [output, beside(output)]
 

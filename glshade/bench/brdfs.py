@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from typing import Any, get_args
 
 from glshade.brdfs import BRDFS, Brdf, numbers
-from glshade.gl.census import Operations, censuses
-from glshade.gl.clock import Spread, on_cpu
+from glshade.driver.census import Operations, censuses
+from glshade.driver.clock import Spread, on_cpu
+from glshade.driver.workload import Workload
 from glshade.gl.context import Backend, open_context
-from glshade.gl.workload import Workload
-from glshade.source import Source, Stage, expand
+from glshade.glsl.generator import Source, Stage, expand
 
 REPEAT = 7
 # The model of the program that is taken off. Adding a model's value to those before it is the model's.

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from glshade.bench.entrants import Entrant, ProgramError, Took, enter
 from glshade.bench.stage import set_up
 from glshade.bench.works import FASTEST, GLSHADE, Work
-from glshade.gl.clock import Spread
+from glshade.driver.clock import Spread
 
 # Pictures are the same where no channel of any pixel is farther apart [codes of 255].
 SAME = 1

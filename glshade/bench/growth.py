@@ -14,10 +14,10 @@ import numpy as np
 from glshade.bench.entrants import FRAMES
 from glshade.bench.stage import DISTANCE, EXPONENT, EYE, FAR, FOV, KD, KS, NEAR, TO_LIGHT
 from glshade.bench.worker import draws
-from glshade.gl.clock import Spread
+from glshade.driver.clock import Spread
 from glshade.gl.renderer import Renderer
-from glshade.primitives import icosphere
-from glshade.scene import Scene
+from glshade.mesh.primitives import icosphere
+from glshade.scene.scene import Scene
 
 # The most that an exponent may be: twice as much takes at most 2.2 times as long.
 NEAR_LINEAR = 1.15

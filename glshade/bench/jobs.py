@@ -11,7 +11,7 @@ from typing import Any
 from glshade.bench.entrants import Files, Took
 from glshade.bench.stage import set_up
 from glshade.bench.works import GLSHADE, WORKS
-from glshade.gl.clock import Spread
+from glshade.driver.clock import Spread
 
 # The least that two jobs are to do in the time of one, on two cores.
 TARGET = 1.4

@@ -11,12 +11,12 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from glshade import __version__
 from glshade.bench.contest import Row
 from glshade.bench.growth import AN_OBJECT, NEAR_LINEAR, Growth
 from glshade.bench.jobs import TARGET, Jobs
 from glshade.bench.works import GLSHADE, WORKS
-from glshade.gl.clock import Spread
+from glshade.driver.clock import Spread
+from glshade.version import __version__
 
 # Raised where a key changes its meaning or goes; keys may be added.
 SCHEMA = 1

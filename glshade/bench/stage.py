@@ -83,8 +83,8 @@ class Stage:
 
 def sphere(subdivisions: int, scattered: bool = False) -> tuple[Array, Array]:
     """Positions (V, 3) float32 and triangles (T, 3) uint32, in local order, or shuffled."""
-    from glshade.mesh import in_local_order
-    from glshade.primitives import icosphere
+    from glshade.mesh.mesh import in_local_order
+    from glshade.mesh.primitives import icosphere
 
     mesh = in_local_order(icosphere(subdivisions))
     positions, triangles = mesh.positions, mesh.triangles

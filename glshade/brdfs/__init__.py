@@ -20,7 +20,7 @@ from pydantic_core import CoreSchema
 from glshade.arrays import rounded
 from glshade.document import Document, Finite, Triple, fault
 from glshade.found import Found
-from glshade.texture import BumpMap, DirectionMap, NormalMap, Picture, Texture
+from glshade.textures.texture import BumpMap, DirectionMap, NormalMap, Picture, Texture
 
 Array = NDArray[np.float64]
 

@@ -9,8 +9,8 @@ from glshade.brdfs import Array, Brdf, Colour, Limit, Parameter, Scalar, above_h
 from glshade.brdfs.blinn_phong import half_vector
 from glshade.brdfs.lambert import Lambert
 from glshade.brdfs.metal import cos_half, fresnel
-from glshade.fresnel import t0_conductor, t_conductor, t_schlick
-from glshade.microfacet import alpha, d_beckmann, smith_beckmann, v_groove
+from glshade.optics.fresnel import t0_conductor, t_conductor, t_schlick
+from glshade.optics.microfacet import alpha, d_beckmann, smith_beckmann, v_groove
 
 
 class Beckmann(Brdf):

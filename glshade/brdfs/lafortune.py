@@ -10,7 +10,7 @@ from glshade.brdfs.lambert import Lambert
 from glshade.brdfs.minnaert import Minnaert
 from glshade.brdfs.phong_normalised import PhongNormalised
 from glshade.brdfs.retro_phong import RetroPhong
-from glshade.texture import Texture
+from glshade.textures.texture import Texture
 
 LOBES = (1, 2, 3)
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from glshade.brdfs import Array, Brdf, Colour, Parameter, Scalar, above_horizon, choice, parameter
 from glshade.brdfs.blinn_phong import half_vector
-from glshade.fresnel import f0_conductor, f_conductor, f_schlick
-from glshade.microfacet import ggx_cos
-from glshade.texture import Texture
+from glshade.optics.fresnel import f0_conductor, f_conductor, f_schlick
+from glshade.optics.microfacet import ggx_cos
+from glshade.textures.texture import Texture
 
 
 class Metal(Brdf):

@@ -10,9 +10,9 @@ from glshade.brdfs.blinn_phong import half_vector
 from glshade.brdfs.ggx import Ggx
 from glshade.brdfs.lambert import Lambert
 from glshade.brdfs.oren_nayar import as_lambert
-from glshade.fresnel import f_dielectric, f_schlick
-from glshade.layered import t_dielectric
-from glshade.microfacet import ggx_cos
+from glshade.optics.fresnel import f_dielectric, f_schlick
+from glshade.optics.interface import t_dielectric
+from glshade.optics.microfacet import ggx_cos
 
 
 class Paint(Brdf):

@@ -7,7 +7,7 @@ import numpy as np
 
 from glshade.brdfs import BRDFS, Array, Brdf, Colour, Law, Limit, Parameter, Scalar, above_horizon, parameter
 from glshade.brdfs.lambert import Lambert
-from glshade.texture import Texture
+from glshade.textures.texture import Texture
 
 
 class Phong(Brdf):

@@ -11,9 +11,9 @@ from glshade.brdfs.blinn_phong import half_vector
 from glshade.brdfs.lambert import Lambert
 from glshade.brdfs.metal import Metal
 from glshade.brdfs.oren_nayar import as_lambert
-from glshade.fresnel import f_dielectric
-from glshade.layered import diffuse_fresnel, t_dielectric
-from glshade.microfacet import ggx_cos
+from glshade.optics.fresnel import f_dielectric
+from glshade.optics.interface import diffuse_fresnel, t_dielectric
+from glshade.optics.microfacet import ggx_cos
 
 
 class Plastic(Brdf):

@@ -8,8 +8,8 @@ import numpy as np
 from glshade.brdfs import Array, Brdf, Colour, Parameter, Scalar, above_horizon, parameter
 from glshade.brdfs.blinn_phong import half_vector
 from glshade.brdfs.metal import cos_half
-from glshade.fresnel import f_schlick, t_schlick
-from glshade.microfacet import ggx_cos
+from glshade.optics.fresnel import f_schlick, t_schlick
+from glshade.optics.microfacet import ggx_cos
 
 
 class RetroGgx(Brdf):

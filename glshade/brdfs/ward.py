@@ -8,7 +8,7 @@ import numpy as np
 from glshade.brdfs import Array, Brdf, Colour, Law, Limit, Parameter, Scalar, above_horizon, parameter
 from glshade.brdfs.lambert import Lambert
 from glshade.brdfs.phong import without_lobe
-from glshade.texture import Texture
+from glshade.textures.texture import Texture
 
 # Models that divide by a cosine count a smaller one as this, some ten float32 roundings above 0.
 GRAZING = 2.0**-20

@@ -13,8 +13,8 @@ from typing import NoReturn
 
 import click
 
-from glshade import __version__
 from glshade.errors import GlshadeError
+from glshade.version import __version__
 
 # pydantic would read the metadata of every installed package, to look for plug-ins of its own: 20 to 50 ms.
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")

@@ -82,7 +82,7 @@ def _named(text: str, common: Mapping[str, Any]) -> Iterable[tuple[str, Brdf]]:
 def _of_a_scene(text: str, file: str, name: str | None) -> list[tuple[str, Brdf]]:
     """The material or, in its place, the object of that name; without a name all materials of the scene that have one."""
     from glshade.document import nearest
-    from glshade.scene_file import load
+    from glshade.scene.file import load
 
     scene = load(file)
     known: dict[str, Brdf] = {
@@ -110,8 +110,8 @@ def _made(text: str, model: type[Brdf], table: Mapping[str, Any]) -> Brdf:
     from pydantic import ValidationError
 
     from glshade.document import nearest
-    from glshade.texture import Texture
-    from glshade.uniforms import parameter_values
+    from glshade.glsl.uniforms import parameter_values
+    from glshade.textures.texture import Texture
 
     # What else a material says is of its surface, not of its light: alpha, sides, a normal map.
     names = {*model.parameters(), *model.choices()}

@@ -51,7 +51,6 @@ def work(
     """
     import json
 
-    from glshade.atomic import replacing
     from glshade.bench.contest import contest
     from glshade.bench.growth import SERIES, growth
     from glshade.bench.jobs import jobs
@@ -59,6 +58,7 @@ def work(
     from glshade.bench.report import Report, markdown
     from glshade.bench.works import BY_HAND, WORKS
     from glshade.cli import _table
+    from glshade.files import replacing
 
     if as_json and as_markdown:
         raise click.UsageError("--json or --markdown?")

@@ -15,8 +15,8 @@ def command(names: tuple[str, ...], as_json: bool) -> None:
 
     Parameters with default, range and unit; options; the laws that a model keeps or breaks; the simpler models it becomes.
     """
-    from glshade import listing
     from glshade.brdfs import BRDFS
+    from glshade.catalogue import listing
     from glshade.cli import _table
 
     chosen = _table.chosen(names, BRDFS, "model")
@@ -40,8 +40,8 @@ def command(names: tuple[str, ...], as_json: bool) -> None:
 
 
 def _show(model: dict[str, Any]) -> None:
-    from glshade import listing
     from glshade.brdfs import Brdf
+    from glshade.catalogue import listing
     from glshade.cli import _table
 
     _table.title(model["name"], model["summary"])

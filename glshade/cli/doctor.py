@@ -39,10 +39,10 @@ def _examine(found: dict[str, Any], backend: str, device: int | None, say: Any) 
     import platform
     from importlib.metadata import version
 
-    from glshade import __version__
+    from glshade.driver.measurement import assumptions, measure
     from glshade.errors import GlshadeError
     from glshade.gl.context import open_context
-    from glshade.gl.measure import assumptions, measure
+    from glshade.version import __version__
 
     found |= {"glshade": __version__, "python": platform.python_version(), "platform": platform.platform()}
     say(f"glshade {__version__}, Python {found['python']}, {found['platform']}")
@@ -118,7 +118,7 @@ def _picture(backend: str, device: int | None) -> str:
 
     from glshade.errors import ContextError
     from glshade.gl.renderer import render
-    from glshade.scene import Scene
+    from glshade.scene.scene import Scene
 
     white = {"brdf": "ambient", "ka": 1.0}
     scene = Scene.model_validate(

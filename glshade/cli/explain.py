@@ -42,8 +42,8 @@ def command(
     some knobs presuppose others. Written: the distinct programs of this scene with its materials as they are written.
     Canonical: with the simplest materials of the same value. Compiled: those whose text differs, as the driver gets them.
     """
-    from glshade.explanation import explanation
-    from glshade.scene_file import load
+    from glshade.glsl.explanation import explanation
+    from glshade.scene.file import load
 
     found = explanation(load(scene, overrides), shading)
     if as_json:
@@ -72,7 +72,7 @@ def command(
 def _with_driver(found: Any, active: bool, census: bool, backend: Any, device: int | None, needed: bool) -> Any:
     """The explanation with what the driver is asked for. Errors: ContextError where there is none, and one is needed."""
     from glshade.errors import ContextError
-    from glshade.explanation import with_active, with_operations
+    from glshade.glsl.explanation import with_active, with_operations
 
     if not (active or census):
         return found

@@ -12,7 +12,7 @@ import click
 @click.option("--json", "as_json", is_flag=True, help="One JSON list of full declarations on stdout.")
 def command(names: tuple[str, ...], as_json: bool) -> None:
     """Lists the lights, one a line; with NAMEs, all that those declare: keys, falloffs, and the GLSL struct."""
-    from glshade import listing
+    from glshade.catalogue import listing
     from glshade.cli import _table
     from glshade.lights import LIGHTS
 

@@ -15,7 +15,7 @@ def command(names: tuple[str, ...], as_json: bool) -> None:
 
     The swatch is what the material shows from straight above under a white sky.
     """
-    from glshade import listing
+    from glshade.catalogue import listing
     from glshade.cli import _table
     from glshade.presets import PRESETS
 

@@ -111,7 +111,7 @@ def command(
     """
     import math
 
-    from glshade import plots
+    from glshade.catalogue import figures as plots
     from glshade.cli._material import materials as named
 
     wanted: Any = plots.KINDS if not kinds or "all" in kinds else tuple(dict.fromkeys(kinds))
@@ -122,7 +122,7 @@ def command(
         name = re.sub(r"[^\w.=-]+", "-", "-".join(Path(text).name for text in materials))
         output = Path(name[:80] + (".png" if bare else ".svg"))
     if bare:
-        from glshade.picture_file import check_suffix
+        from glshade.image.file import check_suffix
 
         check_suffix(output)
     else:
@@ -154,7 +154,7 @@ def command(
 
 def _bare(materials: Any, kind: str, options: Any, scale: str, renderer: Any) -> Any:
     """The pictures side by side."""
-    from glshade.plots import pictures
+    from glshade.catalogue import pictures
 
     images = []
     for material in materials.values():

@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 if TYPE_CHECKING:
+    from glshade.batch.frames import Picture
     from glshade.batch.maker import Maker
     from glshade.batch.task import Task
     from glshade.cli._progress import Plain
-    from glshade.frames import Picture
     from glshade.gl.renderer import Renderer
-    from glshade.scene import Scene
+    from glshade.scene.scene import Scene
     from glshade.tradeoff.budget import Choice
 
 # The film's keys whose options are called otherwise.
@@ -90,7 +90,7 @@ def overrides(command: Any) -> Any:
 def _assignments(texts: tuple[str, ...], option: click.Parameter) -> list[tuple[str, str]]:
     if not texts:
         return []
-    from glshade.override import split
+    from glshade.scene.override import split
 
     try:
         return [split(text) for text in texts]
@@ -207,7 +207,7 @@ def command(
     pictures is there already, unless told to --overwrite, to --skip-existing or to --resume.
     """
     since = perf_counter()
-    from glshade.picture_file import check_suffix
+    from glshade.image.file import check_suffix
 
     if output is not None:
         check_suffix(Path(output))
@@ -265,7 +265,7 @@ def command(
 def _pictures(
     scenes: Sequence[Path], frames: str | None, cameras: tuple[str, ...], output: str | None, sweeps: tuple[str, ...]
 ) -> list[Picture]:
-    from glshade.frames import parse, parse_sweep, pictures
+    from glshade.batch.frames import parse, parse_sweep, pictures
 
     try:
         numbers = None if frames is None else parse(frames)
@@ -381,7 +381,7 @@ def filmed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
         return scene
     from pydantic import ValidationError
 
-    from glshade.scene import Film
+    from glshade.scene.scene import Film
 
     try:
         film = Film.model_validate({**scene.film.model_dump(), **changes})

@@ -10,6 +10,6 @@ def command() -> None:
     """Prints the JSON schema of scene files, for editors and validators."""
     import json
 
-    from glshade.scene import Scene
+    from glshade.scene.scene import Scene
 
     click.echo(json.dumps(Scene.model_json_schema(), indent=2))

@@ -59,7 +59,7 @@ def command(
     """
     from glshade.cli import _table
     from glshade.errors import GlshadeError
-    from glshade.scene_file import load
+    from glshade.scene.file import load
     from glshade.tradeoff.study import REPEAT
 
     wanted = _knobs(knobs)

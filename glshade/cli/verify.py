@@ -10,7 +10,7 @@ import click
 from glshade.cli.render import Size, filmed, overrides
 
 if TYPE_CHECKING:
-    from glshade.scene import Scene
+    from glshade.scene.scene import Scene
 
 
 @click.command()
@@ -59,13 +59,13 @@ def command(
         return
     if scene is None:
         raise click.UsageError("Missing argument 'SCENE'.")
-    from glshade.scene_file import load
+    from glshade.scene.file import load
 
     loaded = filmed(load(scene, overrides), {"size": size})
     if mutate is not None:
         _mutate(loaded, mutate, backend, device, shading, as_json)
         return
-    from glshade.verifier import verify
+    from glshade.verification.verification import verify
 
     verdict = verify(loaded, backend=backend, device=device, shading=shading, max_ambiguous=max_ambiguous / 100)
     page = verdict.report(report, scene.name) if report is not None else None
@@ -82,7 +82,7 @@ def command(
 
 def _mutate(scene: Scene, name: str, backend: Any, device: int | None, shading: Any, as_json: bool) -> None:
     from glshade.document import nearest
-    from glshade.mutations import MUTATIONS, MutatedRenderer, trials
+    from glshade.verification.mutations import MUTATIONS, MutatedRenderer, trials
 
     if name != "all" and name not in MUTATIONS:
         raise click.BadParameter(f"no mutation is named {name!r}{nearest(name, MUTATIONS)}", param_hint="'--mutate'")
@@ -108,7 +108,7 @@ def _mutate(scene: Scene, name: str, backend: Any, device: int | None, shading: 
 
 def _table(backend: Any, device: int | None, as_json: bool) -> None:
     from glshade.gl.renderer import Renderer
-    from glshade.survey import survey
+    from glshade.verification.survey import survey
 
     with Renderer(backend, device) as renderer:
         if as_json:

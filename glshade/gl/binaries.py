@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import TypeAlias
 
-from glshade import cache
+from glshade.files import cache_folder
 
 # An entry: this line, a digest of the key and of all that follows, the driver's number of the format, the data.
 MAGIC = b"glshade program 1\n"
@@ -28,7 +28,7 @@ class Binaries:
 
     def __init__(self, folder: Path | None = None, largest: int = LARGEST) -> None:
         """folder: left out, the programs' part of the user's cache folder. largest: what it may hold [bytes]."""
-        self.folder = folder or cache.folder("programs")
+        self.folder = folder or cache_folder("programs")
         self._largest = largest
         # What the folder holds [bytes], as far as this process knows; None until it has written.
         self._held: int | None = None

@@ -10,13 +10,13 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade import cryptomatte
-from glshade.assembly import Assembly
-from glshade.image import Image
-from glshade.layers import Layers, names_attribute
-from glshade.part import Part
-from glshade.readying import ready
-from glshade.scene import Film, Rate, Scene
+from glshade.assembly.assembly import Assembly
+from glshade.assembly.part import Part
+from glshade.image import cryptomatte
+from glshade.image.image import Image
+from glshade.image.layers import Layers, names_attribute
+from glshade.radiance.readying import ready
+from glshade.scene.scene import Film, Rate, Scene
 
 Array = NDArray[np.float32]
 Numbers = NDArray[np.int32]

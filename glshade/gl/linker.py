@@ -14,8 +14,8 @@ from typing import Any
 
 import moderngl
 
-from glshade import __version__
 from glshade.gl.binaries import Binaries, Binary
+from glshade.version import __version__
 
 # Khronos' registry values (gl.xml).
 GL_VENDOR, GL_RENDERER, GL_VERSION = 0x1F00, 0x1F01, 0x1F02

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from glshade.errors import ShaderError
 from glshade.gl.context import Context
-from glshade.source import Source, Stage
+from glshade.glsl.generator import Source, Stage
 
 # Mesa `0:12(5): error: text`, NVIDIA `0(12) : error C1008: text`, Apple, ANGLE and Intel `ERROR: 0:12: text`.
 _MESA = re.compile(r"^\s*\d+:(?P<line>\d+)\((?P<column>\d+)\):\s*(?P<message>.*)$")

@@ -15,30 +15,30 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade import __version__
 from glshade.arrays import rounded
-from glshade.assembly import Assembly, Instance
-from glshade.camera import window
-from glshade.clusters import facing
-from glshade.digest import digest
+from glshade.assembly.assembly import Assembly, Instance
+from glshade.assembly.culling import facing
 from glshade.errors import SceneError
-from glshade.flat_inputs import with_flat_inputs
 from glshade.gl.context import Backend, Context, open_context
 from glshade.gl.frame import FORMATS, Box, Frame, Storage
 from glshade.gl.program import Program
 from glshade.gl.textures import upload
 from glshade.gl.vertices import Vertices
-from glshade.image import Image
-from glshade.plan import ProgramPlan, plan_instance
-from glshade.readying import ready
-from glshade.scene import Film, Rate, Scene
-from glshade.source import PAGE, Source, expand, generate
-from glshade.texels import Texels
-from glshade.uniforms import Values, ambient_radiance, light_pages, light_uniforms, object_uniforms, textures
+from glshade.glsl.flat_inputs import with_flat_inputs
+from glshade.glsl.generator import PAGE, Source, expand, generate
+from glshade.glsl.plan import ProgramPlan, plan_instance
+from glshade.glsl.uniforms import Values, ambient_radiance, light_pages, light_uniforms, object_uniforms, textures
+from glshade.image.image import Image
+from glshade.radiance.readying import ready
+from glshade.scene.camera import window
+from glshade.scene.digest import digest
+from glshade.scene.scene import Film, Rate, Scene
+from glshade.textures.texels import Texels
+from glshade.version import __version__
 
 if TYPE_CHECKING:
-    from glshade.layers import Layers
-    from glshade.part import Part
+    from glshade.assembly.part import Part
+    from glshade.image.layers import Layers
 
 DType = Literal["uint8", "float32"]
 # Larger pictures are drawn in tiles: at 8192 x 8192 colour and depth already take 1.25 GiB in float32.
@@ -193,7 +193,7 @@ class Renderer:
         film = scene.film
         transform = None
         if dtype == "uint8" and film.transformed:
-            from glshade.view_transform import ViewTransform
+            from glshade.image.view import ViewTransform
 
             transform = ViewTransform.of(film)
         passes = _passes(film, self.context.gl.max_samples)
@@ -554,7 +554,7 @@ def _pieces(film: Film, side: int) -> Iterator[tuple[Box, Box]]:
 
 def _background(colour: tuple[float, ...], encoding: Literal["linear", "srgb"]) -> tuple[float, float, float, float]:
     """Four numbers, premultiplied, encoded as the frame is."""
-    from glshade.srgb import linear_to_srgb
+    from glshade.image.srgb import linear_to_srgb
 
     alpha = colour[3] if len(colour) == 4 else 1.0
     rgb = [c * alpha for c in colour[:3]]

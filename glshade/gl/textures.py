@@ -7,8 +7,8 @@ import ctypes
 import moderngl
 
 from glshade.gl.context import GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, Context
-from glshade.mipmap import levels
-from glshade.texels import Texels
+from glshade.textures.mipmap import levels
+from glshade.textures.texels import Texels
 
 WRAP = {"repeat": 0x2901, "clamp": 0x812F, "mirror": 0x8370}
 

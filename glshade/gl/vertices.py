@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from glshade.gl.context import Context
 from glshade.gl.program import Program
-from glshade.mesh import Mesh
+from glshade.mesh.mesh import Mesh
 
 ATTRIBUTES = {
     "a_position": ("positions", 3),

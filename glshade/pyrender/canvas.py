@@ -14,8 +14,8 @@ from glshade.errors import GlshadeError
 from glshade.gl.frame import GL_DEPTH_COMPONENT32F, _store
 
 if TYPE_CHECKING:
-    from glshade.camera import View
     from glshade.gl.context import Context
+    from glshade.scene.camera import View
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]

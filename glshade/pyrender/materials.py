@@ -15,8 +15,8 @@ from pydantic import ValidationError
 
 from glshade.brdfs import BRDFS, Brdf
 from glshade.errors import SceneError
-from glshade.formats import gltf_material
-from glshade.formats.file import File
+from glshade.mesh.formats import gltf_material
+from glshade.mesh.formats.file import File
 from glshade.pyrender.textures import picture, rgba
 
 Colour = tuple[float, float, float]

@@ -9,9 +9,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.camera import View
-from glshade.mesh import Mesh
-from glshade.values import normal_matrix
+from glshade.assembly.values import normal_matrix
+from glshade.mesh.mesh import Mesh
+from glshade.scene.camera import View
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from glshade.errors import GlshadeError, SceneError
-from glshade.mesh_file import AssetWarning
+from glshade.mesh.file import AssetWarning
 
 if TYPE_CHECKING:
     from glshade.pyrender.painter import Painter

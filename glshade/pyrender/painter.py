@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from glshade.arrays import rounded
-from glshade.assembly import Assembly
-from glshade.camera import View
+from glshade.assembly.assembly import Assembly
 from glshade.errors import SceneError
 from glshade.gl.renderer import Draw, Prepared, Renderer
+from glshade.glsl.generator import PAGE
 from glshade.pyrender.canvas import Canvas
-from glshade.scene import Film, Object, Scene
-from glshade.source import PAGE
+from glshade.scene.camera import View
+from glshade.scene.scene import Film, Object, Scene
 
 if TYPE_CHECKING:
     from glshade.lights import Light

@@ -14,16 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.brdfs import Brdf
-from glshade.camera import Perspective, is_singular
 from glshade.errors import SceneError
+from glshade.image.srgb import srgb_to_linear
 from glshade.lights import LIGHTS, Light
-from glshade.mesh import Mesh
-from glshade.mesh_file import AssetWarning
-from glshade.pyrender.camera import affine_rows, camera
+from glshade.mesh.file import AssetWarning
+from glshade.mesh.mesh import Mesh
+from glshade.pyrender.cameras import affine_rows, camera
 from glshade.pyrender.materials import WHITE, Colour, material, silhouette
 from glshade.pyrender.meshes import Screen, arrays, is_drawn_with_strokes, mesh, strokes
-from glshade.scene import Film, Object, Scene, Transform
-from glshade.srgb import srgb_to_linear
+from glshade.scene.camera import Perspective, is_singular
+from glshade.scene.scene import Film, Object, Scene, Transform
 
 Array = NDArray[np.float64]
 

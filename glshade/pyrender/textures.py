@@ -12,7 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.image import Image
+from glshade.image.image import Image
 
 Bytes = NDArray[np.uint8]
 # What has been written of a texture: the array, and the file.

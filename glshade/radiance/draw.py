@@ -11,14 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.arrays import rounded
-from glshade.assembly import Assembly, Instance
+from glshade.assembly.assembly import Assembly, Instance
+from glshade.assembly.values import ambient_intensity, direction, light_values, normal_matrix
 from glshade.brdfs import BRDFS, Brdf
 from glshade.lights import Falloff, Light
 from glshade.radiance.sampler import Sampler
-from glshade.scene import Scene
-from glshade.texels import Texels, texels
-from glshade.texture import CHANNELS, DirectionMap, Texture
-from glshade.values import ambient_intensity, direction, light_values, normal_matrix
+from glshade.scene.scene import Scene
+from glshade.textures.texels import Texels, texels
+from glshade.textures.texture import CHANNELS, DirectionMap, Texture
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.assembly import Assembly, Instance
-from glshade.mesh import Mesh, ordered
+from glshade.assembly.assembly import Assembly, Instance
+from glshade.mesh.mesh import Mesh, ordered
+from glshade.mesh.subdivision import refined
 from glshade.radiance.draw import Draw, draw_of
 from glshade.radiance.surface import at_vertices, shown, toward_viewer
-from glshade.scene import Scene
-from glshade.subdivision import refined
+from glshade.scene.scene import Scene
 
 Array = NDArray[Any]
 

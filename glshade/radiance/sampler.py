@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.mipmap import levels
-from glshade.texels import Texels
-from glshade.texture import WrapMode
+from glshade.textures.mipmap import levels
+from glshade.textures.texels import Texels
+from glshade.textures.texture import WrapMode
 
 Array = NDArray[Any]
 

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.image import Image
-from glshade.part import Part
+from glshade.assembly.part import Part
+from glshade.image.image import Image
 from glshade.radiance.draw import Draw
 from glshade.reference.bounds import LLVMPIPE, Bounds, Driver, alphas, bounds, depth_slack, driver_of, sealed, turnable
 from glshade.reference.inputs import Inputs, prepare
 from glshade.reference.raster import MARGIN, Fragments, rasterise, resolve
 from glshade.reference.shade import AT_CENTRE, Sampling, is_there, opacity, shade
-from glshade.scene import Rate, Scene
+from glshade.scene.scene import Rate, Scene
 
 __all__ = [
     "LLVMPIPE",

@@ -13,15 +13,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.assembly import Assembly, Instance
-from glshade.camera import window
-from glshade.part import Part
-from glshade.plan import ProgramPlan, plan_instance
+from glshade.assembly.assembly import Assembly, Instance
+from glshade.assembly.part import Part
+from glshade.glsl.plan import ProgramPlan, plan_instance
 from glshade.radiance.draw import Draw, placed, wide
+from glshade.radiance.readying import ready
 from glshade.radiance.sampler import Sampler
-from glshade.readying import ready
-from glshade.scene import Rate, Scene
-from glshade.texels import Texels
+from glshade.scene.camera import window
+from glshade.scene.scene import Rate, Scene
+from glshade.textures.texels import Texels
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

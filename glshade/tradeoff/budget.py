@@ -14,19 +14,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade import __version__, cache, reference
-from glshade.atomic import replacing
-from glshade.digest import digest
+from glshade import reference
 from glshade.errors import GlshadeError
-from glshade.quality import Quality
-from glshade.scene import Object, Scene
-from glshade.srgb import linear_to_srgb
+from glshade.files import cache_folder, replacing
+from glshade.image.metrics import METRICS, Errors, errors, largest
+from glshade.image.srgb import linear_to_srgb
+from glshade.scene.digest import digest
+from glshade.scene.quality import Quality
+from glshade.scene.scene import Object, Scene
 from glshade.tradeoff.front import Timing
-from glshade.tradeoff.metrics import METRICS, Errors, errors, largest
 from glshade.tradeoff.setting import EXACT, Setting, space
 from glshade.tradeoff.study import timed
 from glshade.tradeoff.views import views
-from glshade.verifier import surfaces
+from glshade.verification.verification import surfaces
+from glshade.version import __version__
 
 if TYPE_CHECKING:
     from glshade.gl.renderer import Renderer
@@ -363,7 +364,7 @@ def _grouped(objects: Sequence[Object], pixels: Array) -> list[list[int]]:
 
 def _place(scene: Scene, driver: str, limits: dict[str, float], count: int) -> Path | None:
     key = json.dumps([digest(scene), driver, limits, count, __version__], sort_keys=True)
-    return cache.folder("budgets") / f"{hashlib.sha256(key.encode()).hexdigest()}.json"
+    return cache_folder("budgets") / f"{hashlib.sha256(key.encode()).hexdigest()}.json"
 
 
 def _known(path: Path | None) -> Choice | None:

@@ -18,16 +18,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade import __version__
-from glshade.atomic import replacing
-from glshade.comparison.report import LEAST, RAMP, heat
 from glshade.errors import GlshadeError
-from glshade.image import Image
-from glshade.scene import Scene
+from glshade.files import replacing
+from glshade.image.image import Image
+from glshade.image.metrics import METRICS
+from glshade.scene.scene import Scene
 from glshade.tradeoff.front import ties
-from glshade.tradeoff.metrics import METRICS
 from glshade.tradeoff.setting import KINDS, Setting
 from glshade.tradeoff.study import Pictures, Point, Study
+from glshade.verification.report import LEAST, RAMP, heat
+from glshade.version import __version__
 
 if TYPE_CHECKING:
     from glshade.gl.renderer import Renderer

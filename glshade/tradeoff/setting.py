@@ -7,12 +7,12 @@ from dataclasses import dataclass, fields, replace
 from itertools import product
 from typing import Any
 
-from glshade.assembly import assemble
-from glshade.plan import plan_instance
-from glshade.quality import Quality
-from glshade.readying import ready
-from glshade.scene import Scene
-from glshade.source import generate
+from glshade.assembly.assembly import assemble
+from glshade.glsl.generator import generate
+from glshade.glsl.plan import plan_instance
+from glshade.radiance.readying import ready
+from glshade.scene.quality import Quality
+from glshade.scene.scene import Scene
 
 # Triangles are cut in four this often at most, and refined to these errors of linear light.
 LEVELS = (1, 2)

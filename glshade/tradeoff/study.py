@@ -18,16 +18,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade import __version__, reference
+from glshade import reference
 from glshade.arrays import unrounded
-from glshade.atomic import replacing
-from glshade.digest import digest
-from glshade.readying import ready
-from glshade.scene import Scene
+from glshade.files import replacing
+from glshade.image.metrics import METRICS, Errors, errors
+from glshade.radiance.readying import ready
+from glshade.scene.digest import digest
+from glshade.scene.scene import Scene
 from glshade.tradeoff.front import Timing, dominated
-from glshade.tradeoff.metrics import METRICS, Errors, errors
 from glshade.tradeoff.setting import EXACT, Setting, space
-from glshade.verifier import surfaces
+from glshade.verification.verification import surfaces
+from glshade.version import __version__
 
 if TYPE_CHECKING:
     from glshade.gl.renderer import Renderer

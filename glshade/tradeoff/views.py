@@ -7,9 +7,9 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.assembly import assemble
-from glshade.camera import Orthographic, Perspective
-from glshade.scene import Scene
+from glshade.assembly.assembly import assemble
+from glshade.scene.camera import Orthographic, Perspective
+from glshade.scene.scene import Scene
 
 Array = NDArray[np.float64]
 # Pictures to measure errors by are made this large at most [pixels].

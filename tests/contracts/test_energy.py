@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from strategies import materials
 
 from glshade import BRDFS
-from glshade.albedo import albedo
 from glshade.brdfs import Brdf
+from glshade.catalogue.albedo import albedo
 
 KEPT = [name for name in BRDFS if "energy" not in BRDFS[name].breaks]
 BROKEN = [name for name in BRDFS if "energy" in BRDFS[name].breaks]

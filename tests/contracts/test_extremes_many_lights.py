@@ -13,7 +13,7 @@ import pytest
 from explained import scene
 
 from glshade import Renderer
-from glshade.source import PAGE
+from glshade.glsl.generator import PAGE
 
 CAMERA: dict[str, Any] = {"type": "orthographic", "eye": (0.0, 0.0, 1.0), "target": (0.0, 0.0, 0.0), "height": 1.0}
 

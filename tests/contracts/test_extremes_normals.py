@@ -9,7 +9,7 @@ import pytest
 from explained import BALL, CAMERA, MATERIALS, SUN, everywhere, explain, scene
 
 from glshade import BRDFS, Mesh, Renderer
-from glshade.primitives import icosphere
+from glshade.mesh.primitives import icosphere
 
 # Interior pixels, relative to max(1, |c|). Measured: 4.0e-6 beside normals of no length, 2.0e-6 elsewhere.
 WORST = 5e-5

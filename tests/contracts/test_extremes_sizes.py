@@ -9,7 +9,7 @@ import pytest
 from explained import BALL, CAMERA, SUN, everywhere, scene
 
 from glshade import Mesh, Renderer
-from glshade.primitives import icosphere
+from glshade.mesh.primitives import icosphere
 
 # Interior pixels, relative to max(1, |c|). Measured: 5.4e-6.
 WORST = 5e-5

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from glshade import evaluate
 from glshade.brdfs import BRDFS
 from glshade.brdfs.blinn_phong import half_vector
-from glshade.fresnel import f_conductor, f_dielectric
-from glshade.microfacet import alpha, alphas, d_beckmann, ggx_cos
+from glshade.optics.fresnel import f_conductor, f_dielectric
+from glshade.optics.microfacet import alpha, alphas, d_beckmann, ggx_cos
 
 try:
     import mitsuba

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glshade.picture_file import read
+from glshade.image.file import read
 
 HERE = Path(__file__).resolve().parent
 ROOT = HERE.parents[1]

@@ -6,7 +6,8 @@ import re
 
 import pytest
 
-from glshade import BRDFS, source
+from glshade import BRDFS
+from glshade.glsl import generator as source
 
 
 def struct_fields(file: str, struct: str) -> list[tuple[str, str]]:

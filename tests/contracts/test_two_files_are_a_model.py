@@ -108,7 +108,7 @@ print("found")
 def test_a_toy_model_and_a_toy_light_are_found_and_drawn(tmp_path: Path, python: Any) -> None:
     package = Path(glshade.__file__).parent
     shutil.copytree(package, tmp_path / "glshade", ignore=shutil.ignore_patterns("__pycache__"))
-    shutil.copytree(glshade.source.SHADERS, tmp_path / "shaders")
+    shutil.copytree(glshade.glsl.generator.SHADERS, tmp_path / "shaders")
     (tmp_path / "glshade/brdfs/toy.py").write_text(TOY)
     (tmp_path / "shaders/brdf/toy.glsl").write_text(TOY_GLSL)
     (tmp_path / "glshade/lights/lamp.py").write_text(LAMP)

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from glshade import BRDFS, Mesh, Renderer, Scene, verify
-from glshade.comparison import PixelClass
-from glshade.mesh import with_normals
+from glshade.mesh.mesh import with_normals
+from glshade.mesh.primitives import icosphere
 from glshade.presets import PRESETS, preset
-from glshade.primitives import icosphere
-from glshade.scene import Rate
+from glshade.scene.scene import Rate
+from glshade.verification.judgement import PixelClass
 
 SIZE = (160, 88)
 RATES: tuple[Rate, ...] = ("flat", "gouraud", "phong")

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import glshade
-from glshade.mutations import MUTATIONS, MutatedRenderer, trials
+from glshade.verification.mutations import MUTATIONS, MutatedRenderer, trials
 
 SCENES = sorted((Path(__file__).resolve().parents[2] / "scenes").glob("*.toml"))
 # Between them these show every mutation; the others follow in the slow run.

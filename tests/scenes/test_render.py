@@ -11,7 +11,7 @@ import pytest
 import trimesh
 
 from glshade import Mesh, Renderer, Scene, load
-from glshade.srgb import linear_to_srgb
+from glshade.image.srgb import linear_to_srgb
 
 # Seen from +z, this square just fills a square picture.
 SQUARE = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float)

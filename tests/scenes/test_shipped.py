@@ -13,7 +13,7 @@ import pytest
 
 import glshade
 from glshade.cli import COMMANDS
-from glshade.picture_file import read
+from glshade.image.file import read
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = sorted((ROOT / "scenes").glob("*.toml"))

@@ -11,7 +11,7 @@ import strategies
 from hypothesis import HealthCheck, given, settings
 
 import glshade
-from glshade.scene import Rate
+from glshade.scene.scene import Rate
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = sorted((ROOT / "scenes").glob("*.toml"))

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
-from glshade.animation import Track, at_frame
+from glshade.scene.animation import Track, at_frame
 
 KEYS = st.lists(st.integers(-100, 100), min_size=1, max_size=6, unique=True).map(sorted)
 KINDS = st.sampled_from(["linear", "smooth", "step"])

@@ -15,14 +15,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glshade import picture_file
 from glshade.batch import jobs, leftovers
 from glshade.batch.digest import digest, digest_of
 from glshade.batch.maker import Drawn, Maker
 from glshade.batch.record import Record
 from glshade.batch.task import Task
 from glshade.errors import ContextError
-from glshade.scene_file import load
+from glshade.image import file as picture_file
+from glshade.scene.file import load
 
 # Exposure is the frame's number: what draws can tell which one it is.
 SCENE = """

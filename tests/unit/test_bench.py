@@ -14,11 +14,11 @@ import pytest
 
 from glshade import BRDFS, Renderer, ShaderError
 from glshade.bench.brdfs import NOTHING, operations, size, source, variants
-from glshade.gl.census import KINDS, Census, Operations, census, censuses, count
-from glshade.gl.clock import Spread, difference, seconds
+from glshade.driver.census import KINDS, Census, Operations, census, censuses, count
+from glshade.driver.clock import Spread, difference, seconds
+from glshade.driver.workload import Workload
 from glshade.gl.program import Program
-from glshade.gl.workload import Workload
-from glshade.source import Source, Stage, expand
+from glshade.glsl.generator import Source, Stage, expand
 
 # As Mesa 22 prints a stage.
 OLD = """NIR before handing off to driver:
@@ -145,7 +145,7 @@ class TestCensus:
 
     def test_a_driver_that_shows_nothing(self, monkeypatch: pytest.MonkeyPatch, renderer: Renderer) -> None:
         backend: Any = renderer.context.backend
-        monkeypatch.setattr("glshade.gl.census.ENVIRONMENT", {"ST_DEBUG": ""})
+        monkeypatch.setattr("glshade.driver.census.ENVIRONMENT", {"ST_DEBUG": ""})
         assert census(self.fragment("o = vec4(1.0);"), backend) is None
         assert operations([BRDFS["phong"]()], backend) == [None]
 
@@ -232,7 +232,7 @@ class TestClock:
             asked.append(draw)
             return next(took[draw])
 
-        monkeypatch.setattr("glshade.gl.clock.seconds", stopwatch)
+        monkeypatch.setattr("glshade.driver.clock.seconds", stopwatch)
         draws: Any = ("with", "without")
         assert difference(Any, *draws, repeat=3) == Spread(4.0, 4.0, 6.0)  # type: ignore[arg-type]
         assert asked == ["without", "with"] * 4

@@ -20,7 +20,7 @@ from glshade.gl.binaries import LARGEST, Binaries
 from glshade.gl.context import Context, open_context
 from glshade.gl.linker import GL_NUM_PROGRAM_BINARY_FORMATS, GL_VERSION, Linker
 from glshade.gl.program import Program
-from glshade.source import Source, Stage
+from glshade.glsl.generator import Source, Stage
 
 KEY, OTHER = "0" * 64, "1" * 64
 BINARY = (0x875F, bytes(range(256)) * 40)

@@ -13,10 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glshade import BRDFS, picture_file
+from glshade import BRDFS
 from glshade.bench.brdfs import Cost, Costs
-from glshade.gl.census import KINDS, Operations
-from glshade.gl.clock import Spread
+from glshade.driver.census import KINDS, Operations
+from glshade.driver.clock import Spread
+from glshade.image import file as picture_file
 from glshade.presets import PRESETS
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 from glshade import Renderer, Scene, reference
 from glshade.cli import cli
 from glshade.cli.render import Duration
+from glshade.image.metrics import METRICS, errors
 from glshade.tradeoff import budget
 from glshade.tradeoff.budget import BudgetError, Choice, applied, choose, parse, within_deadline
-from glshade.tradeoff.metrics import METRICS, errors
 from glshade.tradeoff.setting import EXACT, Setting
 from glshade.tradeoff.views import views
-from glshade.verifier import surfaces
+from glshade.verification.verification import surfaces
 
 FEW = 6
 

@@ -13,8 +13,8 @@ from hypothesis.extra import numpy as hnp
 from strategies import fitted_cameras, transforms
 
 from glshade import Orthographic, Perspective, Scene
-from glshade.camera import CAMERAS, View, window
-from glshade.readying import ready
+from glshade.radiance.readying import ready
+from glshade.scene.camera import CAMERAS, View, window
 
 CUBE = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
 ASPECTS = st.sampled_from([0.01, 0.5, 1.0, 16 / 9, 100.0])

@@ -10,10 +10,10 @@ import pytest
 from numpy.typing import NDArray
 
 from glshade import BRDFS, Renderer, evaluate
-from glshade.albedo import albedo
 from glshade.brdfs.ward import GRAZING
-from glshade.source import expand
-from glshade.texture import Texture
+from glshade.catalogue.albedo import albedo
+from glshade.glsl.generator import expand
+from glshade.textures.texture import Texture
 
 Array = NDArray[np.float64]
 UP = np.array([0.0, 0.0, 1.0])

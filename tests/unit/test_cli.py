@@ -14,7 +14,7 @@ import OpenImageIO as oiio
 import pytest
 
 import glshade
-from glshade import picture_file
+from glshade.image import file as picture_file
 
 SCENE = '[[objects]]\nshape = "sphere"\n[film]\nsize = [24, 16]\n'
 BROKEN_DRIVER = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent"}
@@ -347,7 +347,7 @@ def test_exr_says_how_it_was_made(run: Any) -> None:
     spec = source.spec()
     assert str(spec.format) == "float"
     assert tuple(spec.channelnames) == ("R", "G", "B")
-    from glshade.digest import digest
+    from glshade.scene.digest import digest
 
     assert spec.get_string_attribute("glshade:version") == glshade.__version__
     assert spec.get_string_attribute("glshade:scene") == digest(glshade.load("s.toml"))

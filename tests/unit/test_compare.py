@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import glshade
-from glshade.comparison import Expected, PixelClass, classify, judge
-from glshade.comparison.report import Report, class_map, heat, write
+from glshade.verification.judgement import Expected, PixelClass, classify, judge
+from glshade.verification.report import Report, class_map, heat, write
 
 SIZE = (4, 3)
 BACKGROUND = np.array([0.25, 0.5, 0.75, 1.0])

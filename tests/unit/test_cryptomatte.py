@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from glshade.cryptomatte import LAYERS, id_bits, id_floats, metadata, murmur3_32, ranked
+from glshade.image.cryptomatte import LAYERS, id_bits, id_floats, metadata, murmur3_32, ranked
 
 
 @pytest.mark.parametrize(

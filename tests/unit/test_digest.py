@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from glshade import Image, Object, Scene, load
-from glshade.digest import digest
+from glshade.scene.digest import digest
 
 SPHERE = {"shape": "sphere"}
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nf 1/1 2/2 3/3\n"

@@ -13,16 +13,17 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from glshade import BRDFS, Image, Renderer, Scene, plan, variants
-from glshade.assembly import Instance, assemble
+from glshade import BRDFS, Image, Renderer, Scene
+from glshade.assembly.assembly import Instance, assemble
 from glshade.brdfs import Brdf
-from glshade.explanation import Interface, declared, with_active
-from glshade.explanation import explanation as explained
-from glshade.plan import plan_instance
-from glshade.quality import Quality
-from glshade.scene import Rate
-from glshade.scene_file import load
-from glshade.source import Source, Stage
+from glshade.glsl import plan, variants
+from glshade.glsl.explanation import Interface, declared, with_active
+from glshade.glsl.explanation import explanation as explained
+from glshade.glsl.generator import Source, Stage
+from glshade.glsl.plan import plan_instance
+from glshade.scene.file import load
+from glshade.scene.quality import Quality
+from glshade.scene.scene import Rate
 
 SCENES = sorted((Path(__file__).resolve().parents[2] / "scenes").glob("*.toml"))
 SUN: dict[str, Any] = {"type": "directional", "name": "sun"}
@@ -166,7 +167,7 @@ class TestCommand:
         """Nothing of OpenGL is even loaded."""
         code = (
             "import sys; from glshade.cli import cli; cli.main(sys.argv[1:], standalone_mode=False);"
-            "assert not any(name.startswith(('moderngl', 'glcontext', 'glshade.gl')) for name in sys.modules)"
+            "assert not any(name.startswith(('moderngl', 'glcontext', 'glshade.gl.')) for name in sys.modules)"
         )
         said = python(code, "explain", SCENES[0])
         assert "variants: " in said

@@ -12,10 +12,10 @@ import pytest
 from pydantic import ValidationError
 
 from glshade import Film, GlshadeError, Image, Renderer, Scene, SceneError, explain, load, reference, verify
-from glshade.srgb import linear_to_srgb
+from glshade.image.srgb import linear_to_srgb
+from glshade.image.view import shown
 from glshade.tradeoff.views import views
-from glshade.verifier import surfaces
-from glshade.view_transform import shown
+from glshade.verification.verification import surfaces
 
 SCENES = Path(__file__).parents[2] / "scenes"
 # Odd and even corners, a single pixel, the last ones, all.
@@ -357,7 +357,7 @@ class TestViewTransform:
         code = """
 import sys, glshade
 glshade.render(glshade.Scene(objects=[glshade.Object(shape="cube")], film=glshade.Film(size=(4, 4))))
-print(*(name for name in ("glshade.view_transform", "OpenImageIO") if name in sys.modules))
+print(*(name for name in ("glshade.image.view", "OpenImageIO") if name in sys.modules))
 """
         assert python(code) == ""
 

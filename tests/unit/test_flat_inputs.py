@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from glshade import Renderer, Scene, explain
-from glshade.flat_inputs import with_flat_inputs
 from glshade.gl import renderer as drawing
-from glshade.source import Source, generate
+from glshade.glsl.flat_inputs import with_flat_inputs
+from glshade.glsl.generator import Source, generate
 
 LAMPS = [{"type": "point", "position": [3 - i, i, 4], "colour": [1, 0.5, 0.1 * i], "falloff": "1/r"} for i in range(8)]
 SUN, SKY = {"type": "directional", "direction": [-1, -2, -1]}, {"type": "ambient", "intensity": 0.1}

@@ -12,10 +12,10 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
+from glshade.batch.frames import Sweep, parse, parse_sweep, pictures
 from glshade.cli import cli
-from glshade.frames import Sweep, parse, parse_sweep, pictures
-from glshade.picture_file import read
-from glshade.scene_file import SceneFile
+from glshade.image.file import read
+from glshade.scene.file import SceneFile
 
 SCENE = """
 objects = [ { name = "ball", shape = "cube", material = "red" } ]

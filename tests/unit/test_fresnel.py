@@ -9,7 +9,7 @@ import pytest
 from glsl import called
 
 from glshade import Renderer
-from glshade.fresnel import f0_conductor, f_conductor, f_dielectric, f_schlick, t0_conductor, t_conductor, t_schlick
+from glshade.optics.fresnel import f0_conductor, f_conductor, f_dielectric, f_schlick, t0_conductor, t_conductor, t_schlick
 
 COS = np.concatenate([[1e-30, 1e-7, 1e-4], np.linspace(1e-3, 1, 200)])
 # (eta, k): indices near and far from 1, metals of the preset folder, and what only a file can say.

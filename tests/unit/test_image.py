@@ -16,8 +16,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from glshade import AssetError, GlshadeError, Image
-from glshade.picture_file import SUFFIXES, attributes, read
-from glshade.srgb import linear_to_srgb, srgb_to_linear
+from glshade.image.file import SUFFIXES, attributes, read
+from glshade.image.srgb import linear_to_srgb, srgb_to_linear
 
 RAMP = np.linspace(0, 1, 48, dtype=np.float32).reshape(4, 4, 3)
 

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 from strategies import directions
 
 from glshade import BRDFS, Renderer, evaluate
-from glshade.albedo import albedo
 from glshade.brdfs import Brdf
 from glshade.brdfs.principled import gtr1, gtr2
-from glshade.fresnel import f_dielectric
+from glshade.catalogue.albedo import albedo
 from glshade.gl.program import Program
-from glshade.layered import diffuse_fresnel, t_dielectric
-from glshade.source import Source, expand
+from glshade.glsl.generator import Source, expand
+from glshade.optics.fresnel import f_dielectric
+from glshade.optics.interface import diffuse_fresnel, t_dielectric
 
 try:
     import mitsuba

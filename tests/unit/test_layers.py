@@ -13,10 +13,10 @@ from pydantic import ValidationError
 
 import glshade as g
 from glshade import reference
-from glshade.cryptomatte import id_floats
-from glshade.layers import AOVS, CHANNELS, Layers
-from glshade.part import Part
-from glshade.verifier import surfaces
+from glshade.assembly.part import Part
+from glshade.image.cryptomatte import id_floats
+from glshade.image.layers import AOVS, CHANNELS, Layers
+from glshade.verification.verification import surfaces
 
 SIZE = (96, 64)
 CAMERA = {"type": "perspective", "eye": (0.6, 1.4, 4.0), "target": (0.0, 0.0, 0.0), "fov": 40}
@@ -358,7 +358,7 @@ def test_layers_lie_beside_a_picture_of_8_bits(
         "normal.Y",
         "normal.Z",
     )
-    from glshade.picture_file import attributes
+    from glshade.image.file import attributes
 
     assert attributes(tmp_path / "a.png")["glshade:digest"] == "abc"
     # Without layers there is the picture alone.
@@ -394,10 +394,10 @@ def test_every_layer_is_explained() -> None:
 
 @pytest.mark.parametrize("shading", [None, "flat", "gouraud"])
 def test_parts_hold_only_what_they_use(renderer: g.Renderer, scene: Any, shading: Any) -> None:
-    from glshade.explanation import active, declared
-    from glshade.plan import plan_instance
-    from glshade.readying import ready
-    from glshade.source import generate
+    from glshade.glsl.explanation import active, declared
+    from glshade.glsl.generator import generate
+    from glshade.glsl.plan import plan_instance
+    from glshade.radiance.readying import ready
 
     for kind in ("depth", "uv", "normal"):
         assembly = Part(kind).of(ready(scene(), shading))  # type: ignore[arg-type]

@@ -17,9 +17,10 @@ import numpy as np
 import pytest
 
 import glshade as package
-from glshade import BRDFS, LIGHTS, Scene, listing
+from glshade import BRDFS, LIGHTS, Scene
+from glshade.catalogue import listing
+from glshade.image.srgb import linear_to_srgb
 from glshade.presets import PRESETS
-from glshade.srgb import linear_to_srgb
 
 
 @pytest.fixture

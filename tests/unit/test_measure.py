@@ -12,8 +12,8 @@ import click.testing
 import pytest
 
 from glshade.cli.doctor import command
+from glshade.driver import measurement as measure
 from glshade.errors import ContextError
-from glshade.gl import measure
 from glshade.gl.context import Context, open_context
 
 

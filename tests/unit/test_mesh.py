@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glshade import primitives
 from glshade.errors import AssetError
-from glshade.mesh import Mesh, brushed, face_normals, faceted, in_local_order, weld, with_normals, with_tangents
+from glshade.mesh import primitives
+from glshade.mesh.mesh import Mesh, brushed, face_normals, faceted, in_local_order, weld, with_normals, with_tangents
 
 Array = np.ndarray[Any, Any]
 

@@ -15,11 +15,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from glshade import BRDFS, Image, formats, mesh_file
+from glshade import BRDFS, Image
 from glshade.errors import AssetError
-from glshade.formats.polygon import triangulated
-from glshade.mesh import Mesh
-from glshade.mesh_file import AssetWarning, Model, load
+from glshade.mesh import file as mesh_file
+from glshade.mesh import formats
+from glshade.mesh.file import AssetWarning, Model, load
+from glshade.mesh.formats.polygon import triangulated
+from glshade.mesh.mesh import Mesh
 
 ROOT = Path(__file__).parents[2]
 MESHES = ROOT.parent / "shared" / "data" / "meshes"
@@ -643,11 +645,11 @@ def test_a_new_process_reads_the_cache(tmp_path: Path, monkeypatch: pytest.Monke
 def test_the_cache_needs_no_reader(tmp_path: Path) -> None:
     path = written(tmp_path, "a.obj", TRIANGLE + "f 1 2 3\n")
     load(path)
-    code = f"import sys; from glshade import mesh_file; mesh_file.load({str(path)!r}); print(*sys.modules)"
+    code = f"import sys; from glshade.mesh import file; file.load({str(path)!r}); print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], cwd=ROOT, env=os.environ, capture_output=True, text=True, check=True)
     loaded = set(run.stdout.split())
-    assert "glshade.mesh_file" in loaded
-    assert not loaded & {"trimesh", "glshade.formats.obj", "glshade.formats.parser", "logging", "tempfile"}
+    assert "glshade.mesh.file" in loaded
+    assert not loaded & {"trimesh", "glshade.mesh.formats.obj", "glshade.mesh.formats.parser", "logging", "tempfile"}
 
 
 def test_a_changed_material_file_ends_the_entry(tmp_path: Path) -> None:

@@ -12,11 +12,11 @@ from extremes import unit, upward
 from glsl import called
 
 from glshade import BRDFS, Renderer, evaluate
-from glshade.albedo import albedo
 from glshade.brdfs.blinn_phong import half_vector
-from glshade.gl.evaluate import generated
-from glshade.microfacet import LEAST_ROUGHNESS, alpha, alphas, d_beckmann, ggx_cos, ierfc, smith_beckmann, v_groove
-from glshade.source import SHADERS, expand
+from glshade.catalogue.albedo import albedo
+from glshade.gl.evaluation import generated
+from glshade.glsl.generator import SHADERS, expand
+from glshade.optics.microfacet import LEAST_ROUGHNESS, alpha, alphas, d_beckmann, ggx_cos, ierfc, smith_beckmann, v_groove
 
 N = np.array([0.0, 0.0, 1.0])
 ROUGHNESSES = [0.1, 0.5, 0.8, 1.0]

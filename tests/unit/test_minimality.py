@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from strategies import scenes
 
 from glshade import BRDFS, LIGHTS, Image, Mesh, Renderer, Scene, explain, load
-from glshade.assembly import Assembly, Instance, assemble
-from glshade.definitions import uncommented
-from glshade.mutations import VISIBLE
-from glshade.plan import ProgramPlan, plan_instance
-from glshade.source import SHADERS, Source, Stage, generate
-from glshade.uniforms import light_uniforms, object_uniforms, textures
+from glshade.assembly.assembly import Assembly, Instance, assemble
+from glshade.glsl.definitions import uncommented
+from glshade.glsl.generator import SHADERS, Source, Stage, generate
+from glshade.glsl.plan import ProgramPlan, plan_instance
+from glshade.glsl.uniforms import light_uniforms, object_uniforms, textures
+from glshade.verification.mutations import VISIBLE
 
 # Between them these have most features of lights and rates; the others follow in the slow run.
 FEW = ("lights-add", "shading-rates", "simple-model", "spot")

@@ -14,8 +14,8 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from glshade import Scene, SceneError, load
-from glshade.override import LISTS, OverrideError, apply, pairs, parse, split
-from glshade.scene_file import SceneFile
+from glshade.scene.file import SceneFile
+from glshade.scene.override import LISTS, OverrideError, apply, pairs, parse, split
 
 NAMES = st.text("abcxyz", min_size=1, max_size=3)
 LEAVES = st.integers() | st.booleans() | st.text("pq")

@@ -12,10 +12,12 @@ import numpy as np
 import pytest
 
 import glshade
-from glshade import BRDFS, evaluate, lobe, picture_file, plots
-from glshade.albedo import albedo
+from glshade import BRDFS, evaluate
 from glshade.brdfs import Brdf
-from glshade.plots import pictures
+from glshade.catalogue import figures as plots
+from glshade.catalogue import lobe, pictures
+from glshade.catalogue.albedo import albedo
+from glshade.image import file as picture_file
 
 THIRTY, SIXTY = np.radians(30), np.radians(60)
 SCENE = """
@@ -404,7 +406,8 @@ class TestCommand:
     def test_the_bytes_are_always_the_same(self, python: Any, tmp_path: Path) -> None:
         code = """
 import sys
-from glshade import BRDFS, plots
+from glshade import BRDFS
+from glshade.catalogue import figures as plots
 made = plots.figure({"gold": BRDFS["metal"]()}, ["furnace", "fresnel"])
 for suffix in plots.SUFFIXES:
     plots.save(made, sys.argv[1] + suffix)

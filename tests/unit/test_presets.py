@@ -16,9 +16,9 @@ from pydantic import ValidationError
 
 import glshade
 from glshade import BRDFS, Scene
-from glshade.digest import digest
 from glshade.presets import PRESETS, preset
-from glshade.readying import ready
+from glshade.radiance.readying import ready
+from glshade.scene.digest import digest
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "script"))

@@ -10,9 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glshade import primitives
-from glshade.mesh import Mesh, face_normals
-from glshade.primitives import PRIMITIVES
+from glshade.mesh import primitives
+from glshade.mesh.mesh import Mesh, face_normals
+from glshade.mesh.primitives import PRIMITIVES
 
 CLOSED = sorted(set(PRIMITIVES) - {"plane"})
 

@@ -11,7 +11,7 @@ import pytest
 from glshade import Renderer, ShaderError
 from glshade.gl.context import Context
 from glshade.gl.program import TYPES, Program, rewrite
-from glshade.source import Source, Stage
+from glshade.glsl.generator import Source, Stage
 
 STAGE = Stage("a\nb\nc\nd\n", (("x.glsl", 1), ("y.glsl", 7), ("y.glsl", 8), ("<surface>", 3)))
 

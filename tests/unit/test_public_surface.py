@@ -55,7 +55,7 @@ def test_only_gl_knows_opengl() -> None:
     importers = [path for path in root.rglob("*.py") if "import moderngl" in path.read_text(encoding="utf-8")]
     assert importers
     # What glshade is compared with is another program; it draws in a process of its own.
-    assert all(path.parent.name in ("gl", "peers") for path in importers)
+    assert all(path.parent.name in ("gl", "driver", "peers") for path in importers)
 
 
 def test_typed() -> None:

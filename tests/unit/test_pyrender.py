@@ -19,10 +19,10 @@ import pytest
 import glshade
 from glshade import BRDFS, LIGHTS, GlshadeError, SceneError, from_pyrender
 from glshade.gl.renderer import ApproximateWarning
-from glshade.mesh_file import AssetWarning
+from glshade.mesh.file import AssetWarning
 from glshade.pyrender import OffscreenRenderer, RenderFlags
 from glshade.pyrender.scene import mesh
-from glshade.texture import NormalMap, Texture
+from glshade.textures.texture import NormalMap, Texture
 
 WIDTH, HEIGHT = 64, 48
 
@@ -133,7 +133,7 @@ def test_a_texture_is_a_file_and_equal_ones_are_one() -> None:
     assert isinstance(one, Texture)
     assert one.texture == other.texture
     assert one.wrap == ("clamp", "mirror")
-    pixels, _ = glshade.picture_file.read(one.texture, "linear")
+    pixels, _ = glshade.image.file.read(one.texture, "linear")
     np.testing.assert_array_equal(np.rint(pixels * 255), codes)
 
 
@@ -143,7 +143,7 @@ def test_roughness_is_in_red_and_metallic_in_green() -> None:
     made = the_material(square(rough(metallicRoughnessTexture=texture(codes), metallicFactor=1.0)))
     for picture, channel, code in ((made.roughness, 0, 51), (made.metallic, 1, 102)):
         assert picture.channel == "rg"[channel]
-        assert np.rint(glshade.picture_file.read(picture.texture, "linear")[0][..., channel] * 255) == pytest.approx(code)
+        assert np.rint(glshade.image.file.read(picture.texture, "linear")[0][..., channel] * 255) == pytest.approx(code)
 
 
 def test_a_normal_map_is_one() -> None:
@@ -310,7 +310,7 @@ def test_a_spot_fades_as_in_pyrenders_shader(inner: float, outer: float) -> None
 def test_a_background_is_shown_as_it_is() -> None:
     colour = np.array([0.2, 0.4, 0.6, 1.0])
     film = from_pyrender(stage(node(square()), bg_color=colour)).film
-    assert glshade.srgb.linear_to_srgb(np.array(film.background)) == pytest.approx(colour[:3], abs=1e-6)
+    assert glshade.image.srgb.linear_to_srgb(np.array(film.background)) == pytest.approx(colour[:3], abs=1e-6)
     assert len(from_pyrender(stage(node(square()), bg_color=np.array([0.2, 0.4, 0.6, 0.5]))).film.background) == 4
 
 

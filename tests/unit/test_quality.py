@@ -12,11 +12,11 @@ import pytest
 import glshade
 from glshade.brdfs import BRDFS
 from glshade.errors import SceneError
-from glshade.image import Image
-from glshade.plan import explain
-from glshade.quality import Quality
-from glshade.readying import ready
-from glshade.scene import Scene
+from glshade.glsl.plan import explain
+from glshade.image.image import Image
+from glshade.radiance.readying import ready
+from glshade.scene.quality import Quality
+from glshade.scene.scene import Scene
 
 Array = np.ndarray[Any, Any]
 BALL = {"type": "icosphere", "subdivisions": 2}

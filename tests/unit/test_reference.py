@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from glshade import Image, Mesh, Renderer, Scene, reference
-from glshade.primitives import plane, sphere, torus
+from glshade.mesh.primitives import plane, sphere, torus
 from glshade.radiance.sampler import Sampler
 from glshade.reference import clip
 from glshade.reference.raster import Fragments

@@ -13,10 +13,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from strategies import LIGHTS_OF_ANY_TYPE, MATERIALS
 
-from glshade import Image, Mesh, Renderer, Scene, ShaderError, explain, source
+from glshade import Image, Mesh, Renderer, Scene, ShaderError, explain
 from glshade.gl.program import Program
-from glshade.plan import ProgramPlan
-from glshade.source import Source, expand, generate
+from glshade.glsl import generator as source
+from glshade.glsl.generator import Source, expand, generate
+from glshade.glsl.plan import ProgramPlan
 
 SUN, SKY = {"type": "directional"}, {"type": "ambient"}
 

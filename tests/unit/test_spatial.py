@@ -14,11 +14,11 @@ from test_source import nothing_unused
 
 from glshade import BRDFS, Image, Mesh, Renderer, Scene, SceneError, explain, reference, verify
 from glshade.brdfs import Brdf
-from glshade.mutations import MutatedRenderer, Mutation
-from glshade.plan import ProgramPlan
-from glshade.scene import Rate
-from glshade.source import generate
-from glshade.texels import normals
+from glshade.glsl.generator import generate
+from glshade.glsl.plan import ProgramPlan
+from glshade.scene.scene import Rate
+from glshade.textures.texels import normals
+from glshade.verification.mutations import MutatedRenderer, Mutation
 
 RATES: tuple[Rate, ...] = ("flat", "gouraud", "phong")
 FRONT: dict[str, Any] = {"type": "orthographic", "eye": [0, 0, 5], "target": [0, 0, 0], "height": 2}

@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from glshade import primitives, subdivision
-from glshade.mesh import Mesh, face_normals, faceted, weld, with_normals, with_tangents
-from glshade.readying import ready
-from glshade.subdivision import Edges, refined, split, subdivided
+from glshade.mesh import primitives, subdivision
+from glshade.mesh.mesh import Mesh, face_normals, faceted, weld, with_normals, with_tangents
+from glshade.mesh.subdivision import Edges, refined, split, subdivided
+from glshade.radiance.readying import ready
 
 Array = np.ndarray[Any, Any]
 KEY = {"type": "directional", "direction": [0.4, -0.5, -0.8]}

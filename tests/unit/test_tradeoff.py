@@ -18,14 +18,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import glshade
-from glshade.scene import Scene
+from glshade.image.metrics import METRICS, errors, largest
+from glshade.scene.scene import Scene
 from glshade.tradeoff import page
 from glshade.tradeoff import study as studies
 from glshade.tradeoff.front import Timing, dominated, ties
-from glshade.tradeoff.metrics import METRICS, errors, largest
 from glshade.tradeoff.setting import EXACT, KINDS, Setting, space
 from glshade.tradeoff.study import Point, Study, study
-from glshade.verifier import surfaces
+from glshade.verification.verification import surfaces
 
 Array = np.ndarray[Any, Any]
 SCENES = Path(__file__).resolve().parents[2] / "scenes"
@@ -127,7 +127,7 @@ class TestErrors:
             assert p.total.p999 == pytest.approx(np.sort(off)[int(0.999 * (len(off) - 1))], rel=0.05, abs=1e-7)
             x, y = p.total.at
             assert np.abs(drawn - plain).max(axis=2)[y, x] == pytest.approx(p.total.max_abs, abs=1e-7)
-            shown = [glshade.srgb.linear_to_srgb(c)[certain] for c in (drawn, plain)]
+            shown = [glshade.image.srgb.linear_to_srgb(c)[certain] for c in (drawn, plain)]
             codes = [np.floor(c * 255 + 0.5) for c in shown]
             assert p.total.codes == pytest.approx((codes[0] != codes[1]).mean(), abs=1e-3)
             assert p.total.non_finite == 0
@@ -457,9 +457,9 @@ class TestPage:
         of = found["glossy"]
         front = {i for metric in METRICS for i, by in enumerate(of.front(metric)) if by is None}
         assert len(list((folder / "pictures").iterdir())) == 2 * len(front)
-        exact, _ = glshade.picture_file.read(folder / "pictures" / "phong-rgba32f.png", "linear")
+        exact, _ = glshade.image.file.read(folder / "pictures" / "phong-rgba32f.png", "linear")
         drawn = renderer.render(EXACT.applied(small("glossy")), dtype="float32").pixels
-        assert np.abs(exact[..., :3] - glshade.srgb.linear_to_srgb(drawn)).max() <= 0.51 / 255
+        assert np.abs(exact[..., :3] - glshade.image.srgb.linear_to_srgb(drawn)).max() <= 0.51 / 255
 
     def test_room_is_kept(
         self, folder: Path, found: dict[str, Study], renderer: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path

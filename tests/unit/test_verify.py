@@ -11,8 +11,8 @@ import pytest
 
 import glshade as g
 from glshade import reference
-from glshade.comparison import PixelClass
-from glshade.verifier import candidates, single_sample, verdict_of
+from glshade.verification.judgement import PixelClass
+from glshade.verification.verification import candidates, single_sample, verdict_of
 
 LIGHTS = [{"type": "directional", "direction": (-0.4, -0.6, -0.7), "colour": (1.0, 0.9, 0.8)}]
 SIZE = (96, 64)
@@ -87,7 +87,7 @@ def test_one_wrong_pixel_fails_and_is_named(drawn: Any, expected: Any) -> None:
 
 
 def reference_encoded(pixels: Any) -> Any:
-    from glshade.srgb import linear_to_srgb
+    from glshade.image.srgb import linear_to_srgb
 
     return linear_to_srgb(pixels)
 
@@ -228,6 +228,6 @@ def test_reference_picture(glshade: Any, tmp_path: Path) -> None:
     scene.write_text('objects = [{ shape = "sphere" }]\n[film]\nsize = [32, 24]\n', encoding="utf-8")
     done = glshade("render", scene, "--reference", "-o", output)
     assert done.returncode == 0, done.stderr
-    from glshade.picture_file import read
+    from glshade.image.file import read
 
     assert np.abs(read(output)[0][..., :3] - reference.render(g.load(scene)).pixels).max() == 0

@@ -19,8 +19,8 @@ from glshade.bench.jobs import Jobs
 from glshade.bench.report import SCHEMA, Report, markdown
 from glshade.bench.stage import TURN, Stage, eye, set_up, sphere
 from glshade.bench.works import BY_HAND, FASTEST, GLSHADE, WORKS, Work
-from glshade.gl.clock import Spread
-from glshade.scene_file import SceneFile
+from glshade.driver.clock import Spread
+from glshade.scene.file import SceneFile
 
 SMALL = {name: work.small() for name, work in WORKS.items()}
 needs_pillow = pytest.mark.skipif(importlib.util.find_spec("PIL") is None, reason="the program by hand writes PNG by Pillow")

@@ -1,0 +1,35 @@
+"""The public names of glshade, each with the module that holds it. `__init__.py` reads this list at the first use of a name."""
+
+from glshade import reference as reference
+from glshade.brdfs import BRDFS as BRDFS
+from glshade.errors import AssetError as AssetError
+from glshade.errors import ContextError as ContextError
+from glshade.errors import GlshadeError as GlshadeError
+from glshade.errors import SceneError as SceneError
+from glshade.errors import ShaderError as ShaderError
+from glshade.gl.evaluation import evaluate as evaluate
+from glshade.gl.renderer import Renderer as Renderer
+from glshade.gl.renderer import render as render
+from glshade.glsl.plan import Plan as Plan
+from glshade.glsl.plan import explain as explain
+from glshade.image.image import Image as Image
+from glshade.image.layers import Layers as Layers
+from glshade.lights import LIGHTS as LIGHTS
+from glshade.mesh.mesh import Mesh as Mesh
+from glshade.pyrender import from_pyrender as from_pyrender
+from glshade.scene.camera import Orthographic as Orthographic
+from glshade.scene.camera import Perspective as Perspective
+from glshade.scene.file import load as load
+from glshade.scene.scene import Film as Film
+from glshade.scene.scene import Object as Object
+from glshade.scene.scene import Scene as Scene
+from glshade.scene.scene import Transform as Transform
+from glshade.textures.texture import NormalMap as NormalMap
+from glshade.textures.texture import Texture as Texture
+from glshade.verification.judgement import Difference as Difference
+from glshade.verification.judgement import compare as compare
+from glshade.verification.verification import Verdict as Verdict
+from glshade.verification.verification import verify as verify
+from glshade.version import __version__ as __version__
+
+__all__: list[str]

@@ -1,0 +1,1 @@
+"""Assembly: a Scene with everything looked up, ready for either renderer."""

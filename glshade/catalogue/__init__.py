@@ -1,0 +1,1 @@
+"""Catalogue: what models, lights and presets declare, and figures of what they do with light."""

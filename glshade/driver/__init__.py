@@ -1,0 +1,1 @@
+"""Driver: what the OpenGL driver at hand does and what it costs, by measurement."""

@@ -1,0 +1,121 @@
+"""Uniforms: the float32 values that a program is given, by GLSL name.
+
+Everything is computed in float64 and rounded once, here. The reference renderer starts from the same rounded values, so
+that the two renderers share their inputs and nothing else.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glshade.arrays import _precision, rounded
+from glshade.assembly.assembly import Assembly, Instance
+from glshade.assembly.values import ambient_intensity, ambient_reflectance, direction, light_values, normal_matrix
+from glshade.brdfs import Brdf
+from glshade.brdfs import parameter_values as parameter_values
+from glshade.glsl.plan import LightGroup, ProgramPlan, channel
+from glshade.lights import LIGHTS, Light
+from glshade.textures.texels import Texels, texels
+
+Array = NDArray[np.float64]
+Values = dict[str, NDArray[np.float32]]
+
+
+def object_uniforms(plan: ProgramPlan, instance: Instance, eye: Array) -> Values:
+    """What differs from object to object: its place relative to the eye, and its material."""
+    world = instance.world_from_object
+    relative = world.copy()
+    relative[:3, 3] -= eye
+    values: dict[str, Any] = {"u_world_from_object": relative}
+    if plan.directed:
+        values["u_normal_from_object"] = normal_matrix(world[:3, :3])
+    if plan.tangents:
+        values["u_handedness"] = -1.0 if instance.mirrored else 1.0
+    if plan.shows == "depth":
+        values["u_number"] = instance.number
+    values.update(material_uniforms(plan, instance.material))
+    precision = _precision.get()
+    with np.errstate(over="ignore"):  # once for all of an object's numbers
+        return {name: np.asarray(value, dtype=np.float64).astype(precision) for name, value in values.items()}
+
+
+def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
+    """The parameters that the program asks for; a texture's is its factor."""
+    values: dict[str, Any] = {}
+    for name, use in plan.parameters:
+        value = getattr(material, name)
+        if channel(use) is not None:
+            values[f"u_{name}"] = value.factor if type(material).is_colour(name) else value.factor[0]
+        elif use in ("uniform", "grey"):
+            values[f"u_{name}"] = value if use == "uniform" else value[0]
+    if plan.normal_map:
+        # The normals of heights are those of a surface of height 1.
+        values["u_normal_scale"] = material.bump_map.height if material.bump_map else material.normal_map.scale
+    if plan.turned:
+        values["u_turn"] = direction(material)
+    if plan.alpha != "opaque":
+        values["u_alpha"] = material.alpha
+    if plan.alpha == "mask":
+        values["u_alpha_cutoff"] = material.alpha_cutoff
+    return values
+
+
+def textures(plan: ProgramPlan, material: Brdf) -> dict[str, Texels]:
+    """sampler name -> what it samples."""
+    found = {f"u_{plan.picture_of(name)}_texture": texels(material, name) for name in plan.textured}
+    if plan.alpha_from:
+        found[f"u_{plan.alpha_from}_texture"] = texels(material, plan.alpha_from)
+    if plan.normal_map:
+        found["u_normal_map"] = texels(material, "bump_map" if material.bump_map else "normal_map")
+    if plan.direction_map:
+        found["u_direction_map"] = texels(material, "tangent_direction")
+    return found
+
+
+def ambient_radiance(instance: Instance, assembly: Assembly, exposure: float) -> Values:
+    """What ambient light adds to a surface of one colour."""
+    intensity = ambient_intensity(assembly, instance.lights, exposure)
+    return {"u_ambient_radiance": rounded(ambient_reflectance(instance.material) * intensity)}
+
+
+def light_uniforms(plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...], exposure: float) -> Values:
+    """The lights that are plain uniforms: ambient, and the groups that are counted exactly."""
+    values: Values = {}
+    if plan.ambient == "varying":
+        values["u_ambient_intensity"] = rounded(ambient_intensity(assembly, chosen, exposure))
+    for group in plan.lights:
+        if not group.count:
+            continue
+        lights = [
+            light_values(assembly.lights[i], assembly.view.eye, exposure) for i in chosen if group.holds(assembly.lights[i])
+        ]
+        for name in lights[0]:
+            value = np.stack([light[name] for light in lights])
+            values[f"u_{group.key}_{name}"] = value[:, 0] if name == "intensity" and group.white else value
+    return values
+
+
+def std140(type_name: str) -> np.dtype[np.void]:
+    """The layout of a light's struct in a uniform block: vec3 on 16 bytes, float on 4, the whole rounded up to 16."""
+    names, formats, offsets, offset = [], [], [], 0
+    for name, kind in LIGHTS[type_name].fields().items():
+        vector = kind == "vec3"
+        offset = -(-offset // 16) * 16 if vector else offset
+        names.append(name)
+        formats.append("3f4" if vector else "f4")
+        offsets.append(offset)
+        offset += 12 if vector else 4
+    return np.dtype({"names": names, "formats": formats, "offsets": offsets, "itemsize": -(-offset // 16) * 16})
+
+
+def light_pages(group: LightGroup, lights: list[Light], eye: Array, exposure: float, page: int) -> list[NDArray[np.void]]:
+    """The lights of a large group as std140 records, at most `page` a piece."""
+    layout = std140(group.type)
+    records = np.zeros(len(lights), dtype=layout)
+    for index, light in enumerate(lights):
+        for name, value in light_values(light, eye, exposure).items():
+            records[name][index] = value
+    return [records[start : start + page] for start in range(0, len(records), page)]

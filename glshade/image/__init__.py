@@ -1,0 +1,1 @@
+"""Images: pictures as arrays and as files, layers, views, and how two pictures differ."""

@@ -1,0 +1,1 @@
+"""Meshes: triangles with their normals, tangents and order; shapes by formula; files."""

@@ -1,0 +1,1 @@
+"""Optics: float64 physics that several reflectance models share."""

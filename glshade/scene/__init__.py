@@ -1,0 +1,1 @@
+"""Scene: the document that says what a picture shows, and its files."""
