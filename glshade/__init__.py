@@ -1,28 +1,30 @@
-"""glshade: a GLSL shader suite on headless OpenGL. A scene goes in; a picture, and the proof that it is right, come out.
+"""glshade: a GLSL shader suite on headless OpenGL, which turns a scene into a picture and a proof that the picture is right.
 
 The public names are listed once, in the stub `__init__.pyi`. Each is imported when it is first used, so that `import glshade`
-costs nothing.
+takes almost no time.
 """
 
 from __future__ import annotations
 
 import importlib
-import re
-from functools import cache
-from pathlib import Path
-from typing import Any
 
 from glshade.version import __version__ as __version__
 
+# Public name -> the module that the stub imports it from; empty until the stub has been read.
+_table: dict[str, str] = {}
 
-@cache
+
 def _homes() -> dict[str, str]:
-    """Public name -> the module that the stub imports it from."""
-    stub = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
-    return {name: module for module, name in re.findall(r"^from (\S+) import (\w+) as \w+$", stub, re.MULTILINE)}
+    """Returns the table of public names, read from the stub at the first call."""
+    if not _table:
+        # pathlib and re would take longer to import than all the rest of this module.
+        with open(f"{__file__.removesuffix('.py')}.pyi", encoding="utf-8") as stub:
+            lines = [line.split() for line in stub if line.startswith("from ")]
+        _table.update({name: module for _, module, _, name, *_ in lines})
+    return _table
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name == "__all__":
         return list(_homes())
     if name.startswith("__") or name not in _homes():

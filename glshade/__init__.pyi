@@ -11,7 +11,9 @@ from glshade.gl.evaluation import evaluate as evaluate
 from glshade.gl.renderer import Renderer as Renderer
 from glshade.gl.renderer import render as render
 from glshade.glsl.plan import Plan as Plan
-from glshade.glsl.plan import explain as explain
+from glshade.glsl.planner import explain as explain
+from glshade.image.difference import Difference as Difference
+from glshade.image.difference import compare as compare
 from glshade.image.image import Image as Image
 from glshade.image.layers import Layers as Layers
 from glshade.lights import LIGHTS as LIGHTS
@@ -20,15 +22,13 @@ from glshade.pyrender import from_pyrender as from_pyrender
 from glshade.scene.camera import Orthographic as Orthographic
 from glshade.scene.camera import Perspective as Perspective
 from glshade.scene.file import load as load
-from glshade.scene.scene import Film as Film
-from glshade.scene.scene import Object as Object
+from glshade.scene.film import Film as Film
+from glshade.scene.object import Object as Object
+from glshade.scene.object import Transform as Transform
 from glshade.scene.scene import Scene as Scene
-from glshade.scene.scene import Transform as Transform
 from glshade.textures.texture import NormalMap as NormalMap
 from glshade.textures.texture import Texture as Texture
-from glshade.verification.judgement import Difference as Difference
-from glshade.verification.judgement import compare as compare
-from glshade.verification.verification import Verdict as Verdict
+from glshade.verification.verdict import Verdict as Verdict
 from glshade.verification.verification import verify as verify
 from glshade.version import __version__ as __version__
 

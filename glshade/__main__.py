@@ -1,4 +1,4 @@
-"""`python -m glshade`."""
+"""Entry point of `python -m glshade`."""
 
 from glshade.cli import main
 

@@ -1,18 +1,25 @@
-"""Arrays: the types of NumPy arrays that several rooms use, and the one place where float64 is rounded to float32."""
+"""Arrays: the types of NumPy arrays that several packages use, and the one place where float64 is rounded to float32."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+Array: TypeAlias = NDArray[Any]
+Float32: TypeAlias = NDArray[np.float32]
+Float64: TypeAlias = NDArray[np.float64]
+UInt32: TypeAlias = NDArray[np.uint32]
+UInt64: TypeAlias = NDArray[np.uint64]
+Int64: TypeAlias = NDArray[np.int64]
+
 
 def rounded(value: Any) -> NDArray[np.float32]:
-    """float32; what is too large for it becomes infinite, and is refused by the renderer."""
+    """Returns the value rounded to float32. Numbers too large for float32 become infinite; the renderer refuses them later."""
     with np.errstate(over="ignore"):
         return np.asarray(value, dtype=np.float64).astype(_precision.get())
 
@@ -20,9 +27,17 @@ def rounded(value: Any) -> NDArray[np.float32]:
 _precision: ContextVar[Any] = ContextVar("precision", default=np.float32)
 
 
+def precision() -> Any:
+    """Returns the NumPy type of the arrays that `rounded` returns: float32, or float64 within `unrounded`."""
+    return _precision.get()
+
+
 @contextmanager
 def unrounded() -> Iterator[None]:
-    """Within it `rounded` leaves float64 as it is: for the reference alone, to see what rounding the inputs costs."""
+    """Enters a context in which `rounded` keeps float64, to measure how much error the rounding of the inputs adds.
+
+    It is for the reference renderer alone: the GPU takes no float64.
+    """
     token = _precision.set(np.float64)
     try:
         yield

@@ -1,6 +1,7 @@
-"""Document: what every part of a scene file is. Frozen pydantic models that report all their faults at once.
+"""Document: the base class of every table of a scene file, a frozen pydantic model that reports all its faults at once.
 
-pydantic's own messages speak to programmers; these speak to the author of a scene: what is allowed, and the nearest name.
+pydantic's own messages are written for programmers. The messages here are written for the author of a scene: they say which
+values are allowed, and name the key or value with the most similar spelling.
 """
 
 import difflib
@@ -25,11 +26,10 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
-# Internal union branches that pydantic puts in the path of an error; the author of a scene never wrote them.
+# pydantic puts these names of union branches in the path of an error. They are removed, since the author never wrote them.
 BRANCHES = frozenset({"<value>", "<texture-table>", "<shorthand>", "<table>"})
 
-
-# What pydantic calls "a valid dictionary or instance of Film", in the words of a scene file.
+# pydantic's error type -> the message, in the words of a scene file. pydantic itself would ask for "a valid dictionary".
 KINDS = {
     "model_type": "must be a table",
     "model_attributes_type": "must be a table",
@@ -42,24 +42,26 @@ KINDS = {
 
 
 def nearest(name: object, names: Iterable[str]) -> str:
-    """`; did you mean "x"?` for a slip of the pen, else the names that are allowed."""
+    """Returns the end of a message: `; did you mean "x"?` where a name is spelled similarly, else the list of all names."""
     names = sorted(names)
     close = difflib.get_close_matches(str(name), names, n=1)
     return f'; did you mean "{close[0]}"?' if close else "; allowed: " + (", ".join(names) or "none")
 
 
 def fault(message: str) -> PydanticCustomError:
-    """An error with exactly this message: without a context, pydantic leaves braces alone."""
+    """Returns a pydantic error with exactly this message."""
+    # pydantic formats a message that has a context. Without one it leaves the braces in the message alone.
     return PydanticCustomError("scene", message)
 
 
-def shown(value: object) -> str:
-    """`, not 3`, unless it would drown the message."""
+def received(value: object) -> str:
+    """Returns the end of a message, such as `, not 3`; empty if the value is too long to be worth reading."""
     text = repr(value)
     return "" if len(text) > 40 else f", not {text}"
 
 
-def _speak(error: Any, fields: Iterable[str]) -> str:
+def _message(error: Any, fields: Iterable[str]) -> str:
+    """Returns our message for one of pydantic's error details. fields: the keys that the table may have."""
     kind, context = error["type"], error.get("ctx", {})
     given = error["input"]
     if kind == "extra_forbidden":
@@ -77,27 +79,31 @@ def _speak(error: Any, fields: Iterable[str]) -> str:
     if kind == "scene":
         return str(error["msg"])
     message = KINDS.get(kind) or str(error["msg"]).replace("Input should be", "must be")
-    return message + shown(given)
+    return message + received(given)
 
 
 class Document(BaseModel):
-    """A table of the scene file: unknown keys are faults, values are frozen, numbers are finite."""
+    """A table of the scene file. Unknown keys are faults, values cannot be changed, and numbers have to be finite.
 
-    # A validator is built when its model is first met: a scene meets few of them, and start-up time is a feature.
+    Errors: ValidationError with every fault, when it is made.
+    """
+
+    # defer_build: a model's validator is built when it is first used. A scene uses few models, so this saves start-up time.
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, arbitrary_types_allowed=True, defer_build=True)
 
     @field_validator("*", mode="before")
     @classmethod
     def _as_written(cls, value: Any, info: ValidationInfo) -> Any:
-        """A number is written as a number, and a truth value as true or false."""
+        """Refuses values that pydantic would convert: a string or a truth value for a number, a number for a truth value."""
         wanted = cls.model_fields[info.field_name].annotation if info.field_name in cls.model_fields else None
         if wanted is bool and not isinstance(value, bool):
-            raise fault("must be true or false" + shown(value))
+            raise fault("must be true or false" + received(value))
         return number(value) if wanted in (int, float) else value
 
     @model_validator(mode="wrap")
     @classmethod
     def _every_fault(cls, data: Any, handler: ModelWrapValidatorHandler[Any]) -> Any:
+        """Returns the validated document. Errors: ValidationError with the faults of single keys and those between keys."""
         faults: list[InitErrorDetails] = []
         document = None
         try:
@@ -106,7 +112,7 @@ class Document(BaseModel):
             names = [field.alias or name for name, field in cls.model_fields.items()]
             for detail in error.errors(include_url=False):
                 place = tuple(part for part in detail["loc"] if part not in BRANCHES)
-                faults.append(InitErrorDetails(type=fault(_speak(detail, names)), loc=place, input=detail["input"]))
+                faults.append(InitErrorDetails(type=fault(_message(detail, names)), loc=place, input=detail["input"]))
         for loc, message in cls.cross_faults(data):
             faults.append(InitErrorDetails(type=fault(message), loc=loc, input=data))
         if faults:
@@ -115,15 +121,20 @@ class Document(BaseModel):
 
     @classmethod
     def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
-        """Faults between keys, as (place, message); looked for even where single keys are at fault."""
+        """Returns the faults that concern several keys together, as pairs (key path, message).
+
+        They are looked for even where single keys have faults, so the values in `data` are not validated yet.
+        """
         return ()
 
 
 class Chosen:
-    """Annotates a field whose model is chosen by one key: `brdf = "phong"`, `type = "spot"`.
+    """Annotates a field whose class is chosen by one key of its table: `brdf = "phong"`, `type = "spot"`.
 
-    `models` maps names to classes and may load them on demand. A bare string stands for the model with its defaults
-    where `shorthand` is set.
+    models: a table from names to classes, which may import a class when it is asked for.
+    key: the key that holds the name.
+    default: the name where the key is left out; None: the key is required.
+    shorthand: a bare string may stand for the class of that name with all its defaults.
     """
 
     def __init__(
@@ -137,7 +148,7 @@ class Chosen:
         if self.shorthand and isinstance(data, str):
             data = {self.key: data}
         if not isinstance(data, Mapping):
-            raise fault(f"must be a table with the key {self.key!r}" + shown(data))
+            raise fault(f"must be a table with the key {self.key!r}" + received(data))
         name = data.get(self.key, self.default)
         if name is None:
             raise fault(f"lacks the key {self.key!r}" + nearest("", self.models))
@@ -159,7 +170,7 @@ class Chosen:
         choices = [handler(model.__pydantic_core_schema__) for model in self.models.values()]
         for name, choice in zip(self.models, choices, strict=True):
             if name != self.default:
-                # A definition is shared, and takes the requirement with it; the key is what tells the choices apart.
+                # The key tells the choices apart, so it has to be given. All uses of a model share this definition.
                 table = handler.resolve_ref_schema(choice)
                 table["required"] = sorted({*table.get("required", ()), self.key})
         if self.shorthand:
@@ -168,22 +179,23 @@ class Chosen:
 
 
 def number(value: Any) -> Any:
-    """Refuses what pydantic would turn into a number: "3", true."""
+    """Returns the value; refuses strings and truth values, which pydantic would convert into numbers."""
     if isinstance(value, str | bool):
-        raise fault("must be a number" + shown(value))
+        raise fault("must be a number" + received(value))
     return value
 
 
 def _triple(value: Any) -> Any:
+    """Returns three values; a single number is repeated."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         return (value,) * 3
     if isinstance(value, str | bool | Mapping) or not hasattr(value, "__len__") or len(value) != 3:
-        raise fault("must be three numbers, or one that stands for three" + shown(value))
+        raise fault("must be three numbers, or one that stands for three" + received(value))
     return tuple(value)
 
 
 def resolved(path: Path, info: ValidationInfo) -> Path:
-    """The path, from the folder of the scene file; refuses what is no file."""
+    """Returns the path of a file, taken relative to the folder of the scene file; refuses a path where there is no file."""
     folder = (info.context or {}).get("folder")
     path = path.expanduser()
     path = path if path.is_absolute() or folder is None else Path(folder) / path
@@ -197,21 +209,26 @@ def resolved(path: Path, info: ValidationInfo) -> Path:
 Finite = Annotated[float, Field(allow_inf_nan=False), BeforeValidator(number)]
 Vector3 = tuple[Finite, Finite, Finite]
 _NUMBER = {"type": "number"}
-# One number stands for three equal ones.
+# Three numbers; the scene file may give one number in place of three equal ones.
 Triple = Annotated[
     Vector3,
     BeforeValidator(_triple),
     WithJsonSchema({"anyOf": [_NUMBER, {"type": "array", "items": _NUMBER, "minItems": 3, "maxItems": 3}]}),
 ]
-# A file that exists; relative paths start at the folder of the scene file.
+# The path of a file that exists; a relative path starts at the folder of the scene file.
 File = Annotated[Path, AfterValidator(resolved)]
 
 
 def non_zero(value: Vector3) -> Vector3:
-    """Refuses the zero vector, which has no direction."""
+    """Returns the vector; refuses the zero vector, which has no direction."""
     if not any(value):
         raise fault("must not be the zero vector: it has no direction")
     return value
 
 
 Direction = Annotated[Vector3, AfterValidator(non_zero)]
+
+
+def value_of(item: Any, key: str) -> Any:
+    """Returns the value that a table or a Document has for a key; None if it has no such key."""
+    return item.get(key) if isinstance(item, Mapping) else getattr(item, key, None)

@@ -1,7 +1,7 @@
-"""What can go wrong, one class an exit code.
+"""Errors: the classes of everything that glshade raises on purpose, with the exit code that the command line returns for each.
 
-Every message is written for the person who can mend it: the file, the place in it, what was wrong and what to do.
-The table of exit codes is in docs/exit-codes.md.
+Every message is written for the person who can correct the fault. It names the file and the place in it, and says what is
+wrong and what to do. The table of exit codes is in docs/exit-codes.md.
 """
 
 from __future__ import annotations
@@ -10,21 +10,24 @@ from collections.abc import Sequence
 
 
 class GlshadeError(Exception):
-    """The root of every error that glshade raises on purpose; the command line prints it without a traceback."""
+    """The base class of every error that glshade raises on purpose. The command line prints it without a traceback.
+
+    exit_code: the exit code of a command that ends with this error.
+    """
 
     exit_code = 1
 
 
 class MissingLibrary(GlshadeError):
-    """What is asked for needs a library that an extra brings."""
+    """A library is missing that an optional extra of the package installs."""
 
     exit_code = 2
 
 
 class SceneError(GlshadeError):
-    """A scene, or a file it names, is not usable.
+    """A scene, or a file that it names, cannot be used.
 
-    `problems` holds one line a fault, each with file, key path and what is allowed: all of them, not the first.
+    problems: every fault, one line each, with the file, the key path and the values that are allowed.
     """
 
     exit_code = 3
@@ -35,16 +38,16 @@ class SceneError(GlshadeError):
 
 
 class AssetError(SceneError):
-    """A mesh or a texture cannot be read, or holds nothing that can be drawn."""
+    """A mesh or a texture cannot be read, or has no content that can be drawn."""
 
 
 class ShaderError(GlshadeError):
-    """The driver or the include resolver refused a shader; each line reads `file:line:column: message`."""
+    """The driver or the include resolver refused a shader. Each line of the message reads `file:line:column: message`."""
 
     exit_code = 4
 
 
 class ContextError(GlshadeError):
-    """No OpenGL context could be made, or it lacks what the renderer needs."""
+    """No OpenGL context could be made, or the context lacks a feature that the renderer needs."""
 
     exit_code = 5

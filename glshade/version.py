@@ -1,3 +1,3 @@
-"""Version: the one place that says which glshade this is."""
+"""Version: the version number of glshade, which the package's metadata take from here."""
 
 __version__ = "0.1.0"

@@ -1,6 +1,7 @@
-"""docs/accuracy.md: for each model the bound over its whole domain, and what was measured. Called by script/make-accuracy.
+"""Writes docs/accuracy.md: each model's error bound over its whole domain, and its measured errors. script/make-accuracy calls
+it.
 
-The cases and the measure are those of the contract tests (tests/extremes.py), more of them.
+The cases and the measure of error are those of the contract tests (tests/support/extremes.py), with more cases.
 """
 
 from __future__ import annotations
@@ -14,7 +15,8 @@ import numpy as np
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 
-from extremes import (  # noqa: E402
+from pages import table, write  # noqa: E402
+from support.extremes import (  # noqa: E402
     FACTOR,
     ORDINARY,
     STAGES,
@@ -28,54 +30,59 @@ from extremes import (  # noqa: E402
     pairs,
     relative,
 )
-from pages import table, write  # noqa: E402
 
 from glshade import BRDFS, Renderer  # noqa: E402
 from glshade.brdfs import Brdf  # noqa: E402
 
 PAGE = ROOT / "docs" / "accuracy.md"
-# Materials of a model: those at the extremes beyond the walk of each parameter alone, and those within the usual ranges.
+# How many materials of each model are measured: at the extremes, in addition to those that vary a single parameter, and within
+# the usual ranges.
 EXTREME, USUAL = 200, 100
-# Ordinary directions: as high above the horizon as this.
+# Ordinary directions have at least this cosine to the normal.
 HIGH = 0.05
 
 TEXT = """\
 # How exact the models are
 
-<!-- Made by script/make-accuracy, which measures; change that, not this. -->
+<!-- Made by script/make-accuracy, which measures the figures. To change words, change script/accuracy.py, not this page. -->
 
-Each model's `brdf_cos` runs on the GPU in float32 and, from the same float32 inputs, on the CPU in float64. Nothing is clamped
-before the two are compared, and a value that is not finite is a failure, not a figure.
+Each model's `brdf_cos`, which returns the BRDF times the cosine n.l, runs on the GPU in float32 and, with the same float32
+inputs, on the CPU in float64. Neither result is clamped before the two are compared. A value that is not finite counts as a
+failure.
 
-Driver: {driver}. `glshade doctor` tells what another one makes of the functions that this rests on.
+Driver: {driver}. These figures depend on the driver's mathematical functions; `glshade doctor` measures those of your driver.
 
 ## Over a model's whole domain
 
-Every parameter from its least to its greatest value (exponents to 1e8, strengths without a bound to {strong:g}), every pair of
-directions, the horizon and what lies 1e-30 above it included:
+The cases cover every parameter from its smallest to its largest value (exponents up to 1e8, strengths that have no upper bound
+up to {strong:g}) and every pair of directions, including directions in the horizon (the plane of the surface) and directions
+1e-30 above it. The promise is
 
     |gpu - float64|  <=  {factor:g} x conditioning{exceptions}
 
-The conditioning is what rounding the inputs to float32 does to the float64 value: each component of l and v and each parameter
-by half an ulp, the normal by 2^-25 rad to its worst side, these moves added up, and half an ulp of the result. A program in
-float32 can hardly promise less than 1. Below 2^-126 stages flush to zero, and that is no error.
+The conditioning is the change of the float64 value that rounding the inputs to float32 may cause. It is a sum. Each component
+of l and v and each parameter is moved by half an ulp, the normal is turned by 2^-25 rad in the direction that matters most, and
+the changes of the value are added up, with half an ulp of the result. No float32 program can promise much less than 1 x
+conditioning. Results below 2^-126 may become 0.
 
-Parameters are those that are not the model's defaults. The last two columns are the error relative to max(1, f cos) where it
-was worst in units of the conditioning, and where it was worst of all: large where the problem itself is hardly determined, as
-a step at the horizon is.
+The columns "bound", "vertex" and "fragment" are in units of the conditioning: the promise, and the largest error in each shader
+stage. The next columns describe the case with this error, the worst case: its directions, those of its parameters that differ
+from the model's defaults, and its error relative to max(1, f cos). The last column is the largest error of all cases, relative
+to max(1, f cos). An error is large where the problem itself is badly conditioned, which means that a small change of the inputs
+changes the value a lot, for example at a step at the horizon.
 
 {extreme}
 ## At ordinary parameters
 
-The usual range of each parameter (in [scene-file.md](scene-file.md)), both directions more than {high:g} above the horizon: the
-error relative to max(1, f cos). Where a model is worse than its bound in some rare direction, it is within {factor:g} x
-conditioning there.
+The cases cover the usual range of each parameter (in [scene-file.md](scene-file.md)) and directions whose cosine to the normal
+is above {high:g}. The errors are relative to max(1, f cos). In rare directions a model may exceed its bound; its error there is
+within {factor:g} x conditioning.
 
 {ordinary}"""
 
 
 def bounds(name: str) -> float:
-    """What the contract holds the model to, in units of the conditioning."""
+    """The bound that the contract tests check for the model, in units of the conditioning."""
     sys.path.insert(0, str(ROOT / "tests" / "contracts"))
     from test_extremes_conditioning import EXCEPTIONS
 
@@ -84,7 +91,7 @@ def bounds(name: str) -> float:
 
 def page() -> str:
     """The text of docs/accuracy.md, measured now."""
-    from extremes import STRONG
+    from support.extremes import STRONG
 
     l, v, case = joined(pairs())
     usual = (l[:, 2] > HIGH) & (v[:, 2] > HIGH)
@@ -128,7 +135,7 @@ def page() -> str:
 
 
 def parameters(material: Brdf) -> str:
-    """The scalars and options of a material that are not its model's defaults, in a few words."""
+    """The scalars and options of a material that differ from the defaults, as text; "-" where none does."""
     model = type(material)
     names = [*(name for name in model.parameters() if not model.is_colour(name)), *model.choices()]
     given = {name: getattr(material, name) for name in names}
@@ -137,7 +144,7 @@ def parameters(material: Brdf) -> str:
 
 
 def models(text: str) -> list[list[str]]:
-    """The models that have a row in each of the page's tables."""
+    """The names of the models that have a row, for each table of the page."""
     return [re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE) for part in text.split("\n## ")[1:]]
 
 

@@ -1,6 +1,6 @@
-"""docs/brdfs.md: every reflectance model on one page, from what the models declare. Called by script/make-book.
+"""Writes docs/brdfs.md, a page about every reflectance model, from the models' declarations. script/make-book calls it.
 
-What is measured (costs, errors) changes from machine to machine; it stands between marks, and --check leaves it out.
+Measured figures (costs, errors) differ from machine to machine. They stand between marks, and --check ignores them.
 """
 
 from __future__ import annotations
@@ -27,60 +27,16 @@ ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "brdfs.md"
 PICTURES = ROOT / "docs" / "images" / "brdfs"
 ACCURACY = ROOT / "docs" / "accuracy.md"
-# Of a sphere [pixels]; a lobe below it is as wide.
+# The side of a sphere's picture [pixels]. The lobe's picture below it has the same width.
 SIDE = 128
-# Of the lobes' light, in degrees from the normal.
+# The angle between the normal and the light that shows the lobes [degrees].
 INCIDENCE = 45
-# Measurements of each model: a page is kept for long.
+# How often each model is measured. The page is made rarely, so its figures may take their time.
 REPEAT = 15
 
-# The base colour in the pictures, so that highlights stand out.
+# The base colour in the pictures. White highlights are easy to see on it.
 CLAY = (0.5, 0.17, 0.1)
-WARD: Sequence[Mapping[str, Any]] = [{"alpha_x": 0.05}, {"alpha_x": 0.15}, {"alpha_x": 0.4}, {"alpha_x": 0.4, "alpha_y": 0.1}]
-# Four materials of a model, from left to right; where a model is not here, four values of its first scalar.
-WALKS: Mapping[str, Sequence[Mapping[str, Any]]] = {
-    "ambient": [{"ka": 1}, {"ka": 3}, {"ka": 6}, {"ka": 10}],
-    "lambert": [{"kd": 0.1}, {"kd": 0.3}, {"kd": 0.6}, {"kd": 1.0}],
-    "ashikhmin_shirley": [{"pu": 10, "pv": 10}, {"pu": 100, "pv": 100}, {"pu": 1000, "pv": 1000}, {"pu": 10, "pv": 1000}],
-    "ggx": [
-        {"metallic": 0, "roughness": 0.3},
-        {"metallic": 0, "roughness": 0.7},
-        {"metallic": 1, "roughness": 0.3},
-        {"metallic": 1, "roughness": 0.5, "anisotropy": 0.9},
-    ],
-    "lafortune": [
-        {"exponent_1": 10},
-        {"exponent_1": 100},
-        {"cx_1": -1, "cz_1": 0.7, "exponent_1": 10},
-        {"cx_1": 1, "exponent_1": 10},
-    ],
-    "metal": [{"roughness": 0.2}, {"roughness": 0.4}, {"roughness": 0.8}, {"roughness": 0.5, "anisotropy": 0.9}],
-    "paint": [
-        {"flakes": 0},
-        {"flakes": 0.3, "coat_roughness": 0.3},
-        {"flakes": 0.8, "flake_roughness": 0.5},
-        {"flakes": 0.8, "coat": 0},
-    ],
-    "plastic": [{"roughness": 0.1}, {"roughness": 0.3}, {"roughness": 0.6}, {"roughness": 1}],
-    "principled": [
-        {"roughness": 0.3},
-        {"roughness": 0.8, "sheen": 1},
-        {"metallic": 1, "roughness": 0.5, "anisotropy": 0.9},
-        {"roughness": 0.7, "clearcoat": 1},
-    ],
-    "strauss": [
-        {"smoothness": 0.3, "metalness": 0},
-        {"smoothness": 0.8, "metalness": 0},
-        {"smoothness": 0.3, "metalness": 1},
-        {"smoothness": 0.8, "metalness": 1},
-    ],
-    "retro_ggx": [{"roughness": 0.5}, {"roughness": 0.6}, {"roughness": 0.8}, {"roughness": 1.0}],
-    "retro_phong": [{"exponent": 1}, {"exponent": 4}, {"exponent": 16}, {"exponent": 64}],
-    "ward": WARD,
-    "ward_duer": WARD,
-    "ward_gmd": WARD,
-}
-# Light from the viewer shows lobes that turn back, and has to be weak for that: these are bright.
+# The second light comes from the viewer and shows retro-reflection. It is weak, because retro-reflective lobes are bright.
 LIGHTS = (
     {"type": "directional", "direction": (0.55, -0.6, -0.6), "intensity": 0.8},
     {"type": "directional", "direction": (0.0, 0.0, -1.0), "intensity": 0.05},
@@ -92,27 +48,27 @@ INTRODUCTION = """\
 
 <!-- Made by script/make-book from the models; change those, not this. -->
 
-Every model gives f cos [1/sr], the BRDF times the cosine to the light, and 0 where light or viewer is below the horizon. Names
-are those of [notation.md](notation.md): n the normal, l to the light, v to the viewer, h half-way between, r the mirror
-direction.
+Every model returns f cos [1/sr], the BRDF times the cosine to the light. The value is 0 where the light or the viewer is below
+the horizon. Names are those of [notation.md](notation.md): n is the normal, l the direction to the light, v the direction to
+the viewer, h the direction half-way between l and v, and r the mirror direction.
 
-Laws are promised for every parameter within its range, and tested, unless a model says that it breaks one, and why.
-Reciprocity: f(l, v) = f(v, l). Energy: no more light leaves than arrives. Limits are tested too: the two materials have the
-same value to 1e-9 of it, in float64, unless another figure is given.
+**Laws.** Reciprocity means f(l, v) = f(v, l). Energy means that no more light leaves a surface than arrives. Tests check both
+for every parameter within its range, unless a model states that it breaks a law, and why. A *limit* names a simpler material
+with the same value; tests check it to 1e-9 in float64, unless another figure is given.
 
-Pictures: spheres under a light from the upper left, a little light from the viewer and from everywhere, and below each its
-lobe: f cos over the hemisphere for light at {incidence} degrees (orange), by a logarithmic scale of four decades below its
-largest value. Where a model has a kd, it is {clay} unless said otherwise.
+**Pictures.** The spheres are lit from the upper left, with a little light from the viewer and from everywhere. Below each
+sphere is its lobe: f cos over the hemisphere for light at {incidence} degrees (orange), on a logarithmic scale of four decades
+below the largest value. kd is {clay} unless the caption says otherwise.
 """
 
 COSTS = (
     "Nanoseconds of one evaluation, median and range, measured by `glshade bench brdfs` on {renderer}; {version}, with "
-    "{threads} threads. {clock} Operations are those of the driver's intermediate code (NIR), each component of a vector "
-    "counted. Where a model has several rows, the first is its defaults, and the others are its options."
+    "{threads} threads. {clock} Operations are those of the driver's intermediate code (NIR); each component of a vector "
+    "counts. Where a model has several rows, the first shows its defaults and the others its options."
 )
 CLOCK = {
-    "core": "The times are of one core. llvmpipe shares pixels among all its threads, and does all vertices in one.",
-    "wall": "The times are by the clock on the wall, all units of the GPU at work.",
+    "core": "The times are for one core. llvmpipe divides pixels among all its threads, and processes all vertices in one.",
+    "wall": "The times are wall-clock times with all units of the GPU at work.",
 }
 
 FIGURES = ("a pixel [ns]", "a vertex [ns]", "operations", "bytes of GLSL")
@@ -121,35 +77,35 @@ MARK = re.compile(r"(<!-- (?:cost|error)[^>]*-->\n).*?(<!-- end -->\n)", flags=r
 
 
 def marked(key: str, text: str) -> str:
-    """Text that is measured; key says what it is."""
+    """Measured text between its marks. key: names the text."""
     return f"<!-- {key} -->\n{text}<!-- end -->\n"
 
 
 def words(page: str) -> str:
-    """A page without what is measured."""
+    """The page without its measured text, for a comparison."""
     return MARK.sub(r"\1\2", page)
 
 
 def kept(page: str) -> dict[str, str]:
-    """key -> text of what was measured."""
+    """key -> the measured text that the page has."""
     found = re.findall(r"<!-- ((?:cost|error)[^>]*) -->\n(.*?)<!-- end -->\n", page, flags=re.DOTALL)
     return dict(found)
 
 
 def paragraphs(model: type[Brdf]) -> str:
-    """A model's own words, with what Markdown would take for its own escaped."""
+    """The docstring of a model, with the characters escaped that mean something in Markdown."""
     parts = (inspect.getdoc(model) or "").split("\n\n")
     return "\n\n".join(re.sub(r"([*<])", r"\\\1", " ".join(part.split())) for part in parts) + "\n"
 
 
 def headline(model: type[Brdf]) -> str:
-    """What a model is, in the words of its module."""
+    """One line about a model: the first line of its module's docstring, without the name."""
     said = (sys.modules[model.__module__].__doc__ or "").strip().splitlines()[0]
     return said.split(": ", 1)[-1].rstrip(".")
 
 
 def figure(value: Any) -> str:
-    """A value as a scene file would have it; three equal numbers are one."""
+    """A value as a scene file would write it. Three equal numbers become one."""
     if isinstance(value, tuple | list):
         return f"{value[0]:g}" if len(set(value)) == 1 else f"[{', '.join(f'{x:g}' for x in value)}]"
     return f"{value:g}" if isinstance(value, float | int) else str(value)
@@ -173,7 +129,7 @@ def parameters(model: type[Brdf]) -> str:
 
 
 def laws(model: type[Brdf]) -> str:
-    """What a model promises, and what not."""
+    """The list of the laws that a model keeps or breaks, and of its limits."""
     breaks = model.breaks
     said = [f"not kept: {breaks['reciprocity']}" if "reciprocity" in breaks else "kept"]
     shares = " + ".join(model.shares)
@@ -187,30 +143,35 @@ def laws(model: type[Brdf]) -> str:
     return text
 
 
-def walk(model: type[Brdf]) -> list[dict[str, Any]]:
-    """The parameters of the materials in a model's pictures."""
-    if model.model_fields["brdf"].default in WALKS:
-        return [dict(one) for one in WALKS[model.model_fields["brdf"].default]]
-    name, declared = next((name, d) for name, d in model.parameters().items() if not model.is_colour(name))
-    low, high = declared.usual
+def samples(model: type[Brdf]) -> Sequence[Mapping[str, Any]]:
+    """The parameters of the four materials in a model's pictures, from left to right: the model's own samples where it names
+    some, else four values of its first scalar, else four brightnesses of its first colour."""
+    if model.samples:
+        return model.samples
+    colours = [name for name in model.parameters() if model.is_colour(name)]
+    scalars = [name for name in model.parameters() if not model.is_colour(name)]
+    if not scalars:
+        return [{colours[0]: brightness} for brightness in (0.1, 0.3, 0.6, 1.0)]
+    low, high = model.parameters()[scalars[0]].usual
     shares = [i / 3 for i in range(4)]
+    # A range of several decades is divided into equal ratios, a shorter one into equal differences.
     values = [low * (high / low) ** s if low > 0 and high > 10 * low else low + (high - low) * s for s in shares]
-    return [{name: float(f"{value:.2g}")} for value in values]
+    return [{scalars[0]: float(f"{value:.2g}")} for value in values]
 
 
 def caption(model: type[Brdf]) -> str:
-    """What the pictures show, from left to right."""
-    return "; ".join(", ".join(f"{name} {figure(value)}" for name, value in one.items()) for one in walk(model))
+    """The words below a model's picture: the parameters of each sample, from left to right."""
+    return "; ".join(", ".join(f"{name} {figure(value)}" for name, value in one.items()) for one in samples(model))
 
 
 def materials(model: type[Brdf]) -> list[Brdf]:
-    """Those of the pictures."""
+    """The samples as materials. A kd that a sample does not set is CLAY."""
     base = {"kd": CLAY} if "kd" in model.parameters() else {}
-    return [model.model_validate({"brdf": model.model_fields["brdf"].default, **base, **one}) for one in walk(model)]
+    return [model.model_validate({"brdf": model.model_fields["brdf"].default, **base, **one}) for one in samples(model)]
 
 
 def errors() -> dict[str, str]:
-    """model -> the line of its errors, from docs/accuracy.md; a model that was not measured has none."""
+    """model -> the sentence about its errors, from docs/accuracy.md. A model that was not measured is left out."""
     found: dict[str, str] = {}
     parts = ACCURACY.read_text(encoding="utf-8").split("\n## ")[1:] if ACCURACY.exists() else []
     tables = [
@@ -231,10 +192,10 @@ def _cells(line: str) -> list[str]:
 
 
 def cost_rows(rows: Sequence[Cost]) -> list[tuple[str, ...]]:
-    """(what, pixel, vertex, operations, bytes) of each cost."""
+    """One row (variant, pixel, vertex, operations, bytes) a cost, as text."""
 
     def ns(spread: Any) -> str:
-        # A clock has no digits below this, and a difference may come out below 0.
+        # A clock resolves no more digits. A cost is a difference of two measurements, so noise can make it negative.
         low, middle, high = (f"{max(x, 0.0):.1f}" for x in (spread.low, spread.median, spread.high))
         return f"{middle} ({low} to {high})"
 
@@ -251,7 +212,7 @@ def cost_rows(rows: Sequence[Cost]) -> list[tuple[str, ...]]:
 
 
 def measured(costs: Costs) -> dict[str, str]:
-    """key -> text of what was measured, but for the errors."""
+    """key -> the measured text about costs."""
     found = {}
     head = COSTS.format(renderer=costs.renderer, version=costs.version, threads=costs.threads, clock=CLOCK[costs.clock])
     by_model = {name: cost_rows([row for row in costs.rows if row.model == name]) for name in BRDFS}
@@ -267,13 +228,13 @@ def measured(costs: Costs) -> dict[str, str]:
 
 
 def page(costs: Mapping[str, str]) -> str:
-    """The text of docs/brdfs.md; costs: key -> what was measured, where it was."""
+    """The text of docs/brdfs.md. costs: key -> measured text; a missing key leaves its place empty."""
     text = INTRODUCTION.format(incidence=INCIDENCE, clay=figure(CLAY)) + "\n"
     rows = []
     for name, model in BRDFS.items():
         kept_laws = ["no" if law in model.breaks else "yes" for law in ("reciprocity", "energy")]
         rows.append((f"[`{name}`](#{name})", headline(model), *kept_laws, "yes" if model.anisotropic else "no"))
-    text += table(("model", "what it is", "reciprocal", "keeps energy", "anisotropic"), rows)
+    text += table(("model", "description", "reciprocal", "keeps energy", "anisotropic"), rows)
     text += "\n## Cost\n\n" + marked("cost of all", costs.get("cost of all", ""))
     found = errors()
     for name, model in BRDFS.items():
@@ -285,16 +246,17 @@ def page(costs: Mapping[str, str]) -> str:
         own = [preset for preset, one in PRESETS.items() if one.material["brdf"] == name]
         if own:
             text += f"\nPresets: {', '.join(f'[`{preset}`](#presets)' for preset in own)}.\n"
-    text += '\n## Presets\n\n`material = "gold"` in a scene file, or `preset = "gold"` and what is to be another.\n\n'
+    text += "\n## Presets\n\n"
+    text += 'In a scene file: `material = "gold"`, or `{ preset = "gold", roughness = 0.2 }` to change parameters.\n\n'
     presets = [
         (f"`{name}`", f"[`{one.material['brdf']}`](#{one.material['brdf']})", one.description, one.source)
         for name, one in PRESETS.items()
     ]
-    return text + table(("preset", "model", "what it looks like", "source"), presets)
+    return text + table(("preset", "model", "description", "source"), presets)
 
 
 def pictures() -> None:
-    """docs/images/brdfs: for each model its spheres, and their lobes below."""
+    """Writes docs/images/brdfs: one picture a model, with its spheres above and their lobes below."""
     import numpy as np
 
     from glshade import Image, Renderer, Scene
@@ -310,7 +272,7 @@ def pictures() -> None:
                 drawn.side_by_side([_copy(renderer.render(scene, dtype="float32")) for scene in scenes]).pixels
                 for scenes in (spheres, lobes)
             ]
-            # Without attributes: the file changes when the picture does, and not with the driver's name.
+            # Attributes would hold the driver's name, and the file would change although the picture is the same.
             Image(np.concatenate(rows)).save(PICTURES / f"{name}.png")
     for path in PICTURES.glob("*.png"):
         if path.stem not in BRDFS:
@@ -318,12 +280,12 @@ def pictures() -> None:
 
 
 def _copy(image: Image) -> Image:
-    """The renderer draws the next one into the same pixels."""
+    """A copy of the pixels, because the renderer draws the next picture into the same array."""
     return replace(image, pixels=image.pixels.copy())
 
 
 def faults() -> list[str]:
-    """What is not as it should be, as far as that can be told without measuring."""
+    """The faults of the page and its pictures that can be found without measuring; no faults give an empty list."""
     text = PAGE.read_text(encoding="utf-8") if PAGE.exists() else ""
     figures = kept(text)
     found = [] if words(text) == words(page({})) else ["docs/brdfs.md is not what the models say"]

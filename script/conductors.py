@@ -1,8 +1,8 @@
-"""(eta, k) of the metals among the presets, in linear Rec. 709, from published spectra. Called by script/make-conductors.
+"""Derives eta and k of the presets' metals from published spectra, in linear Rec. 709. script/make-conductors calls it.
 
-The Fresnel reflectance of the spectrum at 90 angles of incidence, under D65 to the CIE 1931 2-degree observer, is a colour for
-each angle; (eta, k) of a channel is what has that channel's curve over the angles, by least squares weighted with the cosine.
-The tables of D65 and of the observer are Mitsuba's; the spectra are not part of this repository.
+Fresnel's equations give the reflectance spectrum at each of 90 angles. Under D65 the CIE 1931 2-degree observer sees it as a
+colour. For each channel, (eta, k) is fitted to the channel's curve over the angles, by least squares weighted with the cosine.
+The tables of D65 and of the observer are Mitsuba's. The spectra are not part of this repository.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from glshade.presets import preset
 Array = NDArray[np.float64]
 
 # Preset -> file below `database/data` of refractiveindex.info (CC0; github.com/polyanskiy/refractiveindex.info-database). Where
-# the sets of a metal differ, one that others confirm: Olmon's gold is within 0.01 of McPeak's and Palik's, and 0.05 above
-# Johnson's in green; Rakic's chromium is near Palik's and Sytchkova's, and 0.1 above Johnson's.
+# the measurements of a metal differ, this takes one that others confirm: Olmon's gold is within 0.01 of McPeak's and Palik's,
+# and 0.05 above Johnson's in green; Rakic's chromium is near Palik's and Sytchkova's, and 0.1 above Johnson's.
 FILES = {
     "aluminium": "main/Al/nk/Rakic.yml",
     "brass": "other/alloys/Cu-Zn/nk/Querry-Cu70Zn30.yml",
@@ -38,7 +38,12 @@ COS = np.cos(np.radians(np.arange(90)))
 
 @dataclass(frozen=True)
 class Spectrum:
-    """wavelength [nm], rising, and the index eta + i k there; in between eta and k are linear."""
+    """The index of refraction eta + i k over wavelengths, linear between them.
+
+    wavelength: (N,) in ascending order [nm].
+    eta: (N,) the real part at each wavelength.
+    k: (N,) the imaginary part at each wavelength.
+    """
 
     wavelength: Array
     eta: Array
@@ -47,7 +52,14 @@ class Spectrum:
 
 @dataclass(frozen=True)
 class Fit:
-    """eta, k (3,); what they miss of the spectrum's colour at normal incidence, f0 (3,), and over the angles, (3,) each."""
+    """A fitted index of refraction for each channel of linear Rec. 709, and its residuals.
+
+    eta: (3,) the real part.
+    k: (3,) the imaginary part.
+    f0: (3,) the spectrum's colour at normal incidence.
+    rms: (3,) the root mean square of the residuals over the angles, weighted with the cosine.
+    largest: (3,) the largest residual over the angles.
+    """
 
     eta: Array
     k: Array
@@ -57,20 +69,21 @@ class Fit:
 
 
 def from_yml(path: Path) -> Spectrum:
-    """A table of refractiveindex.info: rows of wavelength [um], n and k."""
+    """Reads a table of refractiveindex.info, which has rows of wavelength [um], n and k."""
     rows = re.findall(r"^ +([\d.eE+-]+) +([\d.eE+-]+) +([\d.eE+-]+) *$", path.read_text(encoding="utf-8"), re.MULTILINE)
     wavelength, eta, k = np.array(rows, dtype=np.float64).T
     return Spectrum(wavelength * 1000, eta, k)
 
 
 def from_spd(folder: Path, symbol: str) -> Spectrum:
-    """Mitsuba's pair of files: rows of wavelength [nm] and value."""
+    """Reads two files of Mitsuba, for eta and for k, which have rows of wavelength [nm] and value."""
     (wavelength, eta), (also, k) = (np.loadtxt(folder / f"{symbol}.{part}.spd").T for part in ("eta", "k"))
     return Spectrum(wavelength, eta, np.interp(wavelength, also, k))
 
 
 def reflectance(eta: Array, k: Array, cos: Array) -> Array:
-    """Fresnel's reflectance of unpolarised light from vacuum, by complex amplitudes."""
+    """The Fresnel reflectance (...) of unpolarised light from vacuum, by complex amplitudes. cos (...): cosine of the angle of
+    incidence."""
     index = eta + 1j * k
     cos_inside = np.sqrt(1 - (1 - cos * cos) / (index * index))
     across = (cos - index * cos_inside) / (cos + index * cos_inside)
@@ -80,7 +93,8 @@ def reflectance(eta: Array, k: Array, cos: Array) -> Array:
 
 
 def rgb_weights(wavelength: Array) -> Array:
-    """(W, 3): linear Rec. 709 of a reflectance is its sum with these; a reflectance of 1 is white, (1, 1, 1)."""
+    """Weights (W, 3) that turn a reflectance (W,) into a colour in linear Rec. 709, as the weighted sum over the wavelengths. A
+    reflectance of 1 gives (1, 1, 1)."""
     import mitsuba
 
     mitsuba.set_variant("scalar_rgb")
@@ -94,17 +108,17 @@ def rgb_weights(wavelength: Array) -> Array:
 
 
 def colour(spectrum: Spectrum, cos: Array = COS) -> Array:
-    """(A, 3): the metal's reflectance in linear Rec. 709 at each angle."""
+    """The metal's reflectance (A, 3) in linear Rec. 709 at each of the A angles."""
     wavelength = np.arange(360.0, 831.0)
     eta, k = (np.interp(wavelength, spectrum.wavelength, values) for values in (spectrum.eta, spectrum.k))
     return reflectance(eta, k, cos[:, None]) @ rgb_weights(wavelength)
 
 
 def fit(spectrum: Spectrum) -> Fit:
-    """The (eta, k) of each channel."""
+    """Fits (eta, k) to each channel of the spectrum's colour."""
     curves = colour(spectrum)
-    # A colour outside Rec. 709, as gold's, asks for a reflectance above 1, which eta = 0 or an infinite k come nearest to: no
-    # channel has less of the one and more of the other than the metal has in visible light.
+    # A colour outside Rec. 709, as that of gold, has a channel with a reflectance above 1. Its best fit would be eta = 0 or an
+    # infinite k. So eta and k are limited to the least eta and the largest k that the metal has in visible light.
     wavelength = np.arange(380.0, 781.0)
     seen = np.log([np.interp(wavelength, spectrum.wavelength, values) for values in (spectrum.eta, spectrum.k)])
     least_eta, most_k = float(seen[0].min()), float(seen[1].max())
@@ -115,7 +129,8 @@ def fit(spectrum: Spectrum) -> Fit:
 
 
 def _least_squares(curve: Array, start: Array, least_eta: float, most_k: float) -> Array:
-    """(eta, k) by Levenberg's and Marquardt's method, in their logarithms, as the bounds are."""
+    """(eta, k) by the Levenberg-Marquardt method, which works on their logarithms. start (2,): logarithms of the first guess;
+    the bounds are logarithms too."""
 
     def residuals(logs: Array) -> Array:
         eta, k = np.exp(logs)
@@ -142,7 +157,7 @@ def _least_squares(curve: Array, start: Array, least_eta: float, most_k: float) 
 
 
 def rounded(values: Array) -> list[float]:
-    """To the four digits that a preset has."""
+    """The values rounded to four digits, as presets have them."""
     return [float(f"{value:.4g}") for value in values]
 
 

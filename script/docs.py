@@ -1,4 +1,7 @@
-"""docs/scene-file.md from the models of the scene file, and docs/images from scenes/. Called by script/make-docs."""
+"""Writes docs/scene-file.md from the classes that describe scene files, and docs/images from scenes/.
+
+script/make-docs calls it.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +16,16 @@ from glshade.document import Document
 from glshade.lights import LIGHTS, Light
 from glshade.scene.animation import Track
 from glshade.scene.camera import CAMERAS, Camera
+from glshade.scene.film import Film
+from glshade.scene.object import Object, Transform
 from glshade.scene.quality import Quality
-from glshade.scene.scene import Film, Object, Scene, Transform
+from glshade.scene.scene import Scene
 from glshade.scene.shape import SHAPES
 from glshade.textures.texture import BumpMap, DirectionMap, NormalMap, Texture
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "scene-file.md"
-# The README's pictures: (scene, width [pixels]).
+# The pictures of README.md and docs/README.md: (scene, width [pixels]).
 PICTURES = (
     ("gallery", 960),
     ("shading-rates", 460),
@@ -35,17 +40,17 @@ INTRODUCTION = """\
 
 <!-- Made by script/make-docs from the models; change those, not this. -->
 
-TOML, or JSON of the same shape. `glshade schema` prints the same as a JSON schema. Files are named relative to the scene file's
-folder. Unknown keys are errors, and so are numbers that are not finite; every fault of a file is reported at once.
+A scene file is TOML, or JSON of the same structure. `glshade schema` prints its JSON schema. Paths of files are relative to the
+scene file's folder. Unknown keys are errors, and so are numbers that are not finite. All faults of a file are reported at once.
 
-A colour is three numbers, linear Rec. 709, or one number that stands for three equal ones. "required" in the column of defaults
-means that there is none; "-" means that the key may be left out and then does what its meaning says.
+A colour is three numbers, linear Rec. 709. One number stands for three equal ones. In the column "default", "required" means
+that the key must be given, and "-" that it is optional; its meaning says what happens without it.
 
-Lists of tables may be written either way: `[[objects]]` and its keys below, or `objects = [ { ... }, { ... } ]`, which in
-TOML has to stand above the first `[table]`.
+TOML has two ways to write a list of tables: `[[objects]]` with the keys below it, or `objects = [ { ... }, { ... } ]`, which
+must stand above the first `[table]`.
 """
 
-# What some keys hold, where the schema says it at length.
+# (class, key) -> the text of the column "takes", for keys whose schema would give a long one.
 NAMED = {
     ("Scene", "film"): "[film](#film)",
     ("Scene", "camera"): "[camera](#camera)",
@@ -71,14 +76,14 @@ TABLES = {
     "DirectionMap": "[direction map](#direction-maps)",
 }
 SAID = {
-    ("Scene", "film"): "what the picture is recorded on",
-    ("Scene", "camera"): "who looks; left out: a perspective view of the whole scene",
-    ("Object", "transform"): "where it is",
+    ("Scene", "film"): "size, samples, background and encoding of the picture",
+    ("Scene", "camera"): "the camera; left out: a perspective view of the whole scene",
+    ("Object", "transform"): "position, rotation and scale",
 }
 
 
 def kind(schema: Mapping[str, Any]) -> str:
-    """What a key takes, in the words of an author of scenes."""
+    """The text of the column "takes": the values that a key allows, in words."""
     if "const" in schema:
         return f'`"{schema["const"]}"`'
     if "enum" in schema:
@@ -99,7 +104,7 @@ def kind(schema: Mapping[str, Any]) -> str:
         if items[0].get("type") == "array":
             return f"{count} rows of {kind(items[0])}"
         if "enum" in items[0]:
-            return f"{count} of these"
+            return f"{count} of these" if count else "list of names"
         words = kind(items[0])
         one, _, bounds = words.partition(" ")
         return f"{count} {one}s {bounds}".strip() if count else f"list of {words}s"
@@ -119,10 +124,10 @@ def _bounds(schema: Mapping[str, Any]) -> str:
 
 
 def default(schema: Mapping[str, Any], key: str) -> str:
-    """The default as a scene file would write it."""
+    """The text of the column "default": the default as a scene file would write it."""
     if "default" not in schema:
-        # A default that is made when it is needed is not in the schema.
-        return "-" if key in {"film", "camera", "transform"} else "required"
+        # The schema has no defaults that are computed. These keys have one.
+        return "-" if key in {"film", "camera", "transform", "quality"} else "required"
     value = schema["default"]
     if value is None or value in ("", {}) or (isinstance(value, dict) and value):
         return "-"
@@ -138,7 +143,7 @@ def default(schema: Mapping[str, Any], key: str) -> str:
 
 
 def table(model: type[Document], without: type[Document] | None = None) -> str:
-    """The keys of a model, but for those that another has already."""
+    """The table of a class's keys. without: a base class whose keys are left out, since they have a table of their own."""
     known = set(without.model_fields) if without else set()
     rows = []
     for key, schema in model.model_json_schema()["properties"].items():
@@ -154,7 +159,7 @@ def table(model: type[Document], without: type[Document] | None = None) -> str:
         if key in {"type", "brdf"}:
             if "const" not in schema:
                 continue
-            meaning = meaning or "chooses this one"
+            meaning = meaning or "selects this type"
         rows.append(f"| `{key}` | {takes} | {default(schema, key)} | {meaning} |")
     return "| key | takes | default | meaning |\n|---|---|---|---|\n" + "\n".join(rows) + "\n" if rows else ""
 
@@ -166,7 +171,7 @@ def _limits(declared: Mapping[str, Any]) -> str:
 
 
 def about(model: type[Document]) -> str:
-    """A model's own words, one paragraph."""
+    """The docstring of a class as one paragraph."""
     return " ".join((model.__doc__ or "").split()) + "\n"
 
 
@@ -177,14 +182,13 @@ def section(level: int, title: str, model: type[Document], without: type[Documen
 def scene_file() -> str:
     """The text of docs/scene-file.md."""
     text = INTRODUCTION
-    text += section(2, "The whole", Scene) + section(2, "Film", Film)
+    text += section(2, "Scene", Scene) + section(2, "Film", Film)
     text += section(2, "Camera", Camera)
     for name, model in CAMERAS.items():
         text += section(3, f"`{name}`", model, Camera)
     text += section(2, "Objects", Object) + section(3, "Transform", Transform)
-    text += (
-        '\n## Shapes\n\nPrimitives of unit size about the origin. `shape = "cube"` stands for `shape = { type = "cube" }`.\n'
-    )
+    text += "\n## Shapes\n\n"
+    text += 'Primitives of unit size, centred at the origin. `shape = "cube"` is short for `shape = { type = "cube" }`.\n'
     for name, model in SHAPES.items():
         text += section(3, f"`{name}`", model)
     text += section(2, "Materials", Brdf)
@@ -212,7 +216,7 @@ def pictures() -> None:
         with Renderer() as renderer:
             scene = scene.model_copy(update={"film": scene.film.model_copy(update={"size": size})})
             image = renderer.render(scene)
-        # Without attributes: the file changes when the picture does, and not with the driver's name.
+        # Attributes would hold the driver's name, and the file would change although the picture is the same.
         Image(image.pixels, image.encoding).save(folder / f"{name}.png")
 
 

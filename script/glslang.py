@@ -1,6 +1,6 @@
-"""Has glslangValidator, a second compiler, read every program that the generator can make of one feature at a time.
+"""Checks generated programs, which between them have every feature, with a second compiler, glslangValidator.
 
-python script/glslang.py: exit code 1 where it finds fault, 0 with a word of warning where it is not installed.
+python script/glslang.py: the exit code is 1 if it complains. If it is not installed, the exit code is 0, with a warning.
 """
 
 from __future__ import annotations
@@ -18,29 +18,33 @@ from typing import get_args
 from glshade.assembly.assembly import assemble
 from glshade.brdfs import BRDFS
 from glshade.gl.evaluation import generated
-from glshade.glsl.generator import Source, expand, generate
-from glshade.glsl.plan import LightGroup, ProgramPlan, Viewer, plan
-from glshade.lights import LIGHTS
+from glshade.glsl.generator import generate
+from glshade.glsl.plan import LightGroup, ProgramPlan, Viewer
+from glshade.glsl.planner import plan
+from glshade.glsl.shaders import SHIPPED, expand
+from glshade.glsl.source import Code, Source, Stage
+from glshade.lights import FALLOFFS, LIGHTS
 from glshade.scene.file import load
 
 ROOT = Path(__file__).parent.parent
 sys.path.insert(0, str(ROOT / "tests"))
 
-from extremes import at_extremes  # noqa: E402
+from support.extremes import at_extremes  # noqa: E402
 
 
 def groups(count: int) -> tuple[LightGroup, ...]:
-    """`count` lights of every kind, white and coloured; a page of each where it is 0."""
+    """Groups of `count` lights for every type and falloff, white and coloured. A count of 0 is for lights in a uniform
+    block."""
     found = []
     for name, cls in LIGHTS.items():
-        falloffs = ("none", "1/r", "1/r^2") if "falloff" in cls.model_fields else ("none",)
-        for falloff, white in itertools.product(() if cls.omnidirectional else falloffs, (False, True) if count else (False,)):
+        falloffs = tuple(FALLOFFS) if "falloff" in cls.model_fields else ("none",)
+        for falloff, white in itertools.product(() if cls.ignores_normal else falloffs, (False, True) if count else (False,)):
             found.append(LightGroup(name, falloff, white, count))
     return tuple(found)
 
 
 def plans() -> Iterator[ProgramPlan]:
-    """Every model at every rate with every light, and every other feature with one of them."""
+    """Plans of every model at every rate with every light, plans with each other feature, and those of the shipped scenes."""
     rates, viewers = ("flat", "gouraud", "phong"), get_args(Viewer)
     for (name, model), use in itertools.product(BRDFS.items(), ("uniform", "texture")):
         parameters = tuple((p, use) for p in model.parameters())
@@ -90,18 +94,29 @@ def plans() -> Iterator[ProgramPlan]:
 
 
 def sources() -> Iterator[Source]:
-    """The programs of plans, and the few that no plan describes."""
+    """The sources of all plans, and of the few programs that have no plan."""
     yield from (generate(one) for one in dict.fromkeys(plans()))
     for encoding in ("linear", "srgb"):
-        output = {"output": f'#include "output/{encoding}.glsl"\n'}
+        output = {"output": Code().include(f"output/{encoding}.glsl")}
         yield Source(expand("pass/picture.vert", {}), expand("pass/picture.frag", output))
     for name in BRDFS:
-        for text in {tuple(generated(material).items()): generated(material) for material in at_extremes(name, 48)}.values():
-            yield Source(expand("pass/evaluate.vert", text), expand("pass/evaluate.frag", text))
+        for material in at_extremes(name, 48):
+            code = generated(material)
+            # main() drops stages that are equal.
+            yield Source(expand("pass/evaluate.vert", code), expand("pass/evaluate.frag", code))
+
+
+def driver_stages() -> Iterator[tuple[Stage, str]]:
+    """The stages that measure the driver, with their suffixes: each for both versions of GLSL that they are compiled in."""
+    for path in sorted((SHIPPED / "driver").iterdir()):
+        if path.suffix in (".vert", ".frag"):
+            for version in ("330", "400"):
+                generated = {"version": f"#version {version} core\n"}
+                yield expand(f"driver/{path.name}", generated), path.suffix.removeprefix(".")
 
 
 def main() -> int:
-    """Writes every distinct stage to a file and has them read in one go."""
+    """Checks every distinct stage in a single run of the compiler. Returns the exit code."""
     compiler = shutil.which("glslangValidator")
     if compiler is None:
         print("glslangValidator is not installed: no second compiler has read the shaders", file=sys.stderr)
@@ -111,6 +126,7 @@ def main() -> int:
         stages[source.vertex.text] = (source.vertex, "vert")
         if source.fragment:
             stages[source.fragment.text] = (source.fragment, "frag")
+    stages |= {stage.text: (stage, suffix) for stage, suffix in driver_stages()}
     with tempfile.TemporaryDirectory() as folder:
         files = {}
         for index, (text, (stage, suffix)) in enumerate(stages.items()):

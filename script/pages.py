@@ -1,4 +1,4 @@
-"""What the scripts that write docs/ share."""
+"""Functions that the scripts which write docs/ share."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from glshade.files import replacing
 
 
 def table(heading: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """A table of GitHub's Markdown; what cells hold is taken as it is, but for the bars that would end them."""
+    """A Markdown table. Cells may hold Markdown; only their vertical bars are escaped, because these would end a cell."""
     lines = [heading, ["---"] * len(heading), *([str(cell).replace("|", "\\|") for cell in row] for row in rows)]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines).replace("| --- " * len(heading), "|---" * len(heading))
 
 
 def write(path: Path, text: str) -> None:
-    """The file appears whole or not at all."""
+    """Replaces the file's text. A failure leaves the old file as it was."""
     with replacing(path) as beside:
         beside.write_text(text, encoding="utf-8")

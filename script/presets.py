@@ -1,4 +1,4 @@
-"""docs/presets.md from glshade/presets/: `script/presets.py` writes it, `--check` only compares."""
+"""Writes docs/presets.md from glshade/presets/. `--check` only compares."""
 
 from __future__ import annotations
 
@@ -14,33 +14,32 @@ INTRODUCTION = """\
 
 <!-- Made by script/presets.py from glshade/presets/; change those, not this. -->
 
-Materials by name. `material = "gold"` in an object takes the scene's own material of that name or, where it has none, the
-preset. A material may start from a preset and go on from there; its model is the preset's:
+A preset is a material with a name. `material = "gold"` in an object means the scene's own material of that name or, if there is
+none, the preset. A material may start from a preset and change some of its parameters. It keeps the preset's model:
 
 ```toml
 [materials]
 worn_gold = { preset = "gold", roughness = 0.5 }
 ```
 
-A preset is a file in `glshade/presets/`, found by its presence. In Python: `from glshade.presets import PRESETS, preset`.
+Each file in `glshade/presets/` is a preset; no list names them. In Python: `from glshade.presets import PRESETS, preset`.
+`scenes/materials.toml` shows all of them.
 
-`scenes/materials.toml` shows them.
-
-| preset | model | looks like | source |
+| preset | model | description | source |
 |---|---|---|---|
 """
 
 METALS = """
-## Where the metals' figures are from
+## The metals' figures
 
-`script/make-conductors` derives eta and k of the metals from published spectra, and compares them with the presets. The
-reflectance of a spectrum by Fresnel's equations, under D65 to the CIE 1931 2-degree observer, is a colour in linear Rec. 709
-for each of 90 angles; (eta, k) of a channel is what has that channel's curve, by least squares weighted with the cosine. The
-curves are met to 0.006 over all angles, most to 0.001. The exception is gold's red: its colour is outside Rec. 709, with 1.04
-in red, and the preset has 0.98.
+`script/make-conductors` derives eta and k of the metals from published spectra, and compares them with the presets. Fresnel's
+equations turn a spectrum into a reflectance for each wavelength and angle. Under D65 and for the CIE 1931 2-degree observer,
+this gives a colour in linear Rec. 709 for each of 90 angles. For each channel, (eta, k) is fitted to this curve by least
+squares, weighted with the cosine. The fitted curves are within 0.006 at all angles, and most are within 0.001. The exception is
+gold's red: its colour is outside Rec. 709, with 1.04 in red, and the preset has 0.98.
 
-Measurements of one metal differ by more than that, with the film, its age and its oxide: by 0.01 (aluminium) to 0.1 (chromium,
-iron, titanium).
+Measurements of one metal differ by more than that, depending on the film, its age and its oxide: by 0.01 (aluminium) to 0.1
+(chromium, iron, titanium).
 """
 
 

@@ -1,4 +1,4 @@
-"""What all tests share: one OpenGL context a process, and a cache folder that is nobody's."""
+"""Fixtures that all tests share: one OpenGL context a process, and an empty cache folder in place of the user's."""
 
 from __future__ import annotations
 
@@ -36,6 +36,20 @@ def renderer() -> Iterator[Renderer]:
     backend: Any = os.environ.get("GLSHADE_TEST_BACKEND", "auto")
     with Renderer(backend) as renderer:
         yield renderer
+
+
+@pytest.fixture(autouse=True)
+def free_gl_objects(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Frees the programs, textures and buffers that a test leaves behind.
+
+    moderngl keeps what Python has dropped until gc() is called. Many tests link programs of their own, and a worker process
+    that runs thousands of them would grow to several GB.
+    """
+    used = request.getfixturevalue("renderer") if "renderer" in request.fixturenames else None
+    yield
+    if used is not None:
+        with used.context.gl as gl:
+            gl.gc()
 
 
 class Picture:

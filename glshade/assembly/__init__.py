@@ -1,1 +1,1 @@
-"""Assembly: a Scene with everything looked up, ready for either renderer."""
+"""Assembly: a scene whose names and files are all looked up, as both renderers take it."""

@@ -1,6 +1,6 @@
-"""Assembly: a Scene with everything looked up: meshes loaded and made ready, transforms multiplied, materials and lights found.
+"""Assembly: a scene with its meshes prepared, its transforms multiplied, and its materials and lights looked up.
 
-Both renderers start here. Nothing is rounded yet but the meshes, which are float32 from the start.
+Both renderers start from an Assembly. Its meshes are float32; everything else is still float64.
 """
 
 from __future__ import annotations
@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 from weakref import WeakKeyDictionary
@@ -17,61 +17,43 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from glshade.assembly.default_rig import rig
+from glshade.assembly.instance import Instance
 from glshade.brdfs import BRDFS, Brdf
 from glshade.errors import SceneError
-from glshade.lights import LIGHTS, Light
+from glshade.lights import Light
 from glshade.mesh import file as mesh_file
-from glshade.mesh.mesh import Mesh, faceted, ordered, with_normals, with_tangents
+from glshade.mesh.facets import faceted
+from glshade.mesh.mesh import Mesh
+from glshade.mesh.model import MeshPart
+from glshade.mesh.normals import with_normals
+from glshade.mesh.order import ordered
+from glshade.mesh.tangents import with_tangents
 from glshade.scene.camera import View
-from glshade.scene.quality import Quality
-from glshade.scene.scene import Normals, Object, Rate, Scene
+from glshade.scene.object import Normals, Object, Rate
+from glshade.scene.scene import Scene
 
 Array = NDArray[np.float64]
 
-
-# Up to here a camera that frames the scene looks at every vertex; beyond, at boxes, which takes no time and leaves more air.
+# A camera that chooses its own position is fitted to the scene's vertices if there are at most this many. If there are more, it
+# is fitted to the meshes' bounding boxes, which is faster but shows the scene a little smaller.
 FRAMED_EXACTLY = 200_000
-
-
-# depth: with the instance's number beside it.
-Shows = Literal["light", "depth", "uv", "normal"]
-
-
-@dataclass(frozen=True, eq=False)
-class Instance:
-    """One mesh in its place.
-
-    name: the object's, for messages. mesh: ready for its rate (faceted for flat), with tangents where they are asked for.
-    world_from_object (4, 4) float64, for positions relative to the mesh's own origin. back_faces: whether they are drawn.
-    lights: which of the assembly's reach it. quality: the object's and the scene's together; rate and mesh have it in them.
-    number: of the scene's objects, which one. made_of: its material's name, or that of the first object or part which has it.
-    shows: light, or what else of its surface a picture has in that place.
-    """
-
-    name: str
-    mesh: Mesh
-    world_from_object: Array
-    material: Brdf
-    rate: Rate
-    back_faces: bool
-    vertex_colours: bool
-    lights: tuple[int, ...]
-    quality: Quality
-    number: int
-    made_of: str
-    shows: Shows = "light"
-
-    @cached_property
-    def mirrored(self) -> bool:
-        """Whether the transform turns counter-clockwise into clockwise."""
-        return bool(np.linalg.det(self.world_from_object[:3, :3]) < 0)
+# If the largest distance of a scene from the eye is below SMALLEST or above LARGEST [scene units], the scene is drawn in
+# another unit of length. These bounds keep the squares of lengths well inside the range of float32.
+SMALLEST, LARGEST = 1e-12, 1e12
+# The material of an object that has none, and its name in messages.
+DEFAULT_NAME = "default"
+DEFAULT_MATERIAL: Brdf = BRDFS["phong"].model_validate({"kd": 0.6, "ks": 0.25, "exponent": 50.0})
 
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """Instances in scene order, the lights (a default rig where the scene has none), and the view.
+    """A scene with everything looked up.
 
-    unit: how long the scene's unit of length is here; 1 but where float32 could not hold the squares of lengths.
+    instances: the instances, in the order of the scene's objects.
+    lights: the scene's lights, or the default rig where the scene lists none.
+    view: the camera at its final position.
+    unit: the factor of all lengths. It differs from 1 only if the squares of lengths would leave the range of float32.
     """
 
     instances: tuple[Instance, ...]
@@ -80,61 +62,119 @@ class Assembly:
     unit: float = 1.0
 
 
-def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
-    """Looks everything up. `shading` overrules every object's.
+@dataclass(frozen=True, eq=False)
+class _Piece:
+    """One mesh of an object, before the view and the lights are known.
 
-    Errors: SceneError (AssetError) with every fault of every mesh, material and texture coordinate.
+    item: the object.
+    number: index of the object in the scene.
+    name: name for messages: that of the object, with the part's name if the object's mesh file has several parts.
+    mesh: the mesh as it was read or made.
+    world: transform (4, 4) float64 of positions from object space to world space.
+    material: the material to draw it with.
+    made_of, source: as in `Instance`.
     """
-    problems: list[str] = []
-    pieces: list[tuple[Object, str, Mesh, Array, Brdf, str]] = []
-    by_name = {item.name: item for item in scene.objects}
-    numbers = {id(item): index for index, item in enumerate(scene.objects)}
-    for index, item in enumerate(scene.objects):
-        try:
-            pieces.extend(_pieces(scene, by_name, item, item.name or f"objects[{index}]"))
-        except SceneError as error:
-            problems.extend(f"objects[{index}].mesh: {problem}" for problem in error.problems)
-    if problems:
-        raise SceneError(problems)
-    boxes = [_corners(mesh.bounds, world) for _, _, mesh, world, *_ in pieces]
-    width, height = scene.film.size
-    points = boxes
-    if scene.camera.framing and sum(len(mesh.positions) for _, _, mesh, *_ in pieces) <= FRAMED_EXACTLY:
-        points = [_placed(mesh.positions + mesh.origin, world) for _, _, mesh, world, *_ in pieces]
-    view = scene.camera.view(np.concatenate(points), width / height)
+
+    item: Object
+    number: int
+    name: str
+    mesh: Mesh
+    world: Array
+    material: Brdf
+    made_of: str
+    source: object
+
+    @cached_property
+    def box(self) -> Array:
+        """The corners (8, 3) of a box round the mesh, in world space."""
+        upper = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)])
+        return _placed(self.mesh.bounds[upper, np.arange(3)], self.world)
+
+    def points(self) -> Array:
+        """Returns the positions of the vertices (V, 3), in world space."""
+        return _placed(self.mesh.positions + self.mesh.origin, self.world)
+
+
+def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
+    """Returns the assembly of a scene.
+
+    shading: optional, the shading rate of all objects in place of their own.
+    Errors: SceneError (AssetError) with all faults of meshes, materials and missing texture coordinates.
+    """
+    pieces = _pieces(scene)
+    view = _view(scene, pieces)
     lights = scene.lights if scene.lights is not None else rig(view)
-    instances = []
-    for (item, name, mesh, world, material, made_of), box in zip(pieces, boxes, strict=True):
-        chosen = tuple(
-            i
-            for i, light in enumerate(lights)
-            if (light.only is None or item.name in light.only) and light.intensity != 0 and any(light.colour)
-        )
-        ambient = any(lights[i].omnidirectional for i in chosen)
-        quality = item.quality.over(scene.quality) if item.quality else scene.quality
-        material = quality.material(material).canonical(ambient)
-        rate = shading or quality.shading or item.shading
-        problems.extend(f"{name}: {problem}" for problem in _needs_uvs(mesh, material))
-        back_faces = _draws_back_faces(item, mesh, material, world, box, view)
-        tangents = material.needs_tangents or material.normal_map is not None or material.bump_map is not None
-        levels = (quality.subdivide or 0) if rate != "phong" else 0
-        ready = _ready(mesh, rate == "flat", item.normals, item.threshold, tangents, levels)
-        local = world.copy()
-        local[:3, 3] += world[:3, :3] @ mesh.origin
-        colours = item.vertex_colours and mesh.colours is not None
-        number = numbers[id(item)]
-        instances.append(Instance(name, ready, local, material, rate, back_faces, colours, chosen, quality, number, made_of))
+    instances = tuple(_instance(scene, piece, view, lights, shading) for piece in pieces)
+    problems: list[str] = []
+    for piece, instance in zip(pieces, instances, strict=True):
+        problems.extend(_needs_uvs(piece, instance.material))
     if problems:
         raise SceneError(problems)
-    return _in_range(Assembly(tuple(instances), tuple(lights), view), np.concatenate(boxes))
+    return _in_range(Assembly(instances, tuple(lights), view), np.concatenate([piece.box for piece in pieces]))
 
 
-# Within these the squares of lengths stay well inside float32; scenes beyond are drawn in another unit of length.
-SMALLEST, LARGEST = 1e-12, 1e12
+def _pieces(scene: Scene) -> list[_Piece]:
+    """Returns the meshes of all objects. Errors: SceneError with the faults of all mesh files and their materials."""
+    pieces: list[_Piece] = []
+    problems: list[str] = []
+    by_name = {item.name: item for item in scene.objects}
+    for number, item in enumerate(scene.objects):
+        try:
+            pieces.extend(_pieces_of(scene, by_name, number, item))
+        except SceneError as error:
+            problems.extend(f"objects[{number}].mesh: {problem}" for problem in error.problems)
+    if problems:
+        raise SceneError(problems)
+    return pieces
+
+
+def _view(scene: Scene, pieces: list[_Piece]) -> View:
+    """Returns the scene's camera at its final position."""
+    width, height = scene.film.size
+    exactly = scene.camera.framing and sum(len(piece.mesh.positions) for piece in pieces) <= FRAMED_EXACTLY
+    points = [piece.points() if exactly else piece.box for piece in pieces]
+    return scene.camera.view(np.concatenate(points), width / height)
+
+
+def _instance(scene: Scene, piece: _Piece, view: View, lights: tuple[Light, ...], shading: Rate | None) -> Instance:
+    """Returns the instance of a piece. shading: as in `assemble`."""
+    item, mesh = piece.item, piece.mesh
+    chosen = tuple(
+        i
+        for i, light in enumerate(lights)
+        if (light.only is None or item.name in light.only) and light.intensity != 0 and any(light.colour)
+    )
+    ambient = any(lights[i].omnidirectional for i in chosen)
+    quality = item.quality.over(scene.quality) if item.quality else scene.quality
+    material = quality.material(piece.material).canonical(ambient)
+    rate = shading or quality.shading or item.shading
+    tangents = material.needs_tangents or material.normal_map is not None or material.bump_map is not None
+    levels = (quality.subdivide or 0) if rate != "phong" else 0
+    # The positions of a mesh are relative to its origin.
+    world_from_object = piece.world.copy()
+    world_from_object[:3, 3] += piece.world[:3, :3] @ mesh.origin
+    return Instance(
+        name=piece.name,
+        mesh=_ready(mesh, rate == "flat", item.normals, item.threshold, tangents, levels),
+        world_from_object=world_from_object,
+        material=material,
+        rate=rate,
+        back_faces=_draws_back_faces(piece, material, view),
+        vertex_colours=item.vertex_colours and mesh.colours is not None,
+        lights=chosen,
+        quality=quality,
+        number=piece.number,
+        made_of=piece.made_of,
+        source=piece.source,
+    )
 
 
 def _in_range(assembly: Assembly, corners: Array) -> Assembly:
-    """The assembly, or the same picture at a size whose squares float32 can hold: all lengths times a power of two."""
+    """Returns an assembly that gives the same picture, and whose squared lengths fit into float32.
+
+    All lengths are multiplied by a power of two, which rounds nothing. An assembly of ordinary size is returned as it is.
+    corners: the corners of boxes round the instances (N, 3), in world space [scene units].
+    """
     view = assembly.view
     reach = float(np.abs(corners - view.eye).max())
     if reach == 0 or SMALLEST <= reach <= LARGEST:
@@ -157,48 +197,47 @@ def _in_range(assembly: Assembly, corners: Array) -> Assembly:
     )
 
 
-def rig(view: View) -> tuple[Light, ...]:
-    """The lights of a scene that says nothing of light: a key over the viewer's left shoulder, a fill, a little ambient."""
-    right, up, backward = view.axes
+def _pieces_of(scene: Scene, by_name: dict[str | None, Object], number: int, item: Object) -> Iterator[_Piece]:
+    """Yields the meshes of one object: one for each part of its mesh file, or the only one. Errors: SceneError.
 
-    def toward(x: float, y: float, z: float) -> tuple[float, ...]:
-        return tuple(float(c) for c in -(x * right + y * up + z * backward))
-
-    directional, ambient = LIGHTS["directional"], LIGHTS["ambient"]
-    return (
-        directional.model_validate({"name": "key", "direction": toward(-0.7, 0.9, 0.8), "intensity": 0.95}),
-        directional.model_validate({"name": "fill", "direction": toward(1.0, 0.1, 0.6), "intensity": 0.2}),
-        ambient.model_validate({"name": "ambient", "intensity": 0.08}),
-    )
-
-
-def _pieces(
-    scene: Scene, by_name: dict[str | None, Object], item: Object, name: str
-) -> Iterator[tuple[Object, str, Mesh, Array, Brdf, str]]:
-    """(object, name, mesh, world_from_object, material, its name): one for each part of its mesh file."""
-    world = _world(by_name, item)
+    by_name: the scene's objects by name.
+    number: index of the object in the scene.
+    item: the object.
+    """
+    name, world = item.name or f"objects[{number}]", _world(by_name, item)
     own = scene.materials[item.material] if isinstance(item.material, str) else item.material
     own_name = item.material if isinstance(item.material, str) else name if own else DEFAULT_NAME
-    if item.shape is not None:
-        yield item, name, item.shape.mesh(), world, own or DEFAULT_MATERIAL, own_name
-    elif isinstance(item.mesh, Mesh):
-        yield item, name, item.mesh, world, own or DEFAULT_MATERIAL, own_name
-    elif item.mesh is not None:
+    if isinstance(item.mesh, Path):
         model = mesh_file.load(item.mesh)
-        # Parts of one material may share it.
+        # Parts with equal materials share the name of the first such part.
         first: dict[str, str] = {repr(None): DEFAULT_NAME}
         for part in model.parts:
             label = f"{name}/{part.name}" if len(model.parts) > 1 else name
             made_of = own_name if own else first.setdefault(repr(part.material), label)
-            yield item, label, part.mesh, world @ part.transform, own or _file_material(part, item.mesh), made_of
+            material = own or _file_material(part, item.mesh)
+            yield _Piece(item, number, label, part.mesh, world @ part.transform, material, made_of, model)
+    else:
+        mesh = item.mesh if item.shape is None else item.shape.mesh()
+        assert mesh is not None
+        yield _Piece(item, number, name, mesh, world, own or DEFAULT_MATERIAL, own_name, mesh)
 
 
-@lru_cache(maxsize=4096)
-def _file_material(part: mesh_file.Part, path: Path) -> Brdf:
+# The materials that mesh files give to their parts, for as long as the parts exist.
+_file_materials: WeakKeyDictionary[MeshPart, Brdf] = WeakKeyDictionary()
+
+
+def _file_material(part: MeshPart, path: Path) -> Brdf:
+    """Returns the material that a mesh file gives to a part; the same object for the same part.
+
+    path: the mesh file, which messages name.
+    Errors: SceneError.
+    """
     if part.material is None:
         return DEFAULT_MATERIAL
     try:
-        return BRDFS[part.material["brdf"]].model_validate(part.material)
+        if part not in _file_materials:
+            _file_materials[part] = BRDFS[part.material["brdf"]].model_validate(part.material)
+        return _file_materials[part]
     except ValidationError as error:
         faults = error.errors(include_url=False)
         raise SceneError(
@@ -206,11 +245,8 @@ def _file_material(part: mesh_file.Part, path: Path) -> Brdf:
         ) from None
 
 
-DEFAULT_NAME = "default"
-DEFAULT_MATERIAL: Brdf = BRDFS["phong"].model_validate({"kd": 0.6, "ks": 0.25, "exponent": 50.0})
-
-
 def _world(by_name: dict[str | None, Object], item: Object) -> Array:
+    """Returns the transform (4, 4) from an object to world space, through all its parents."""
     world = item.transform.array()
     while item.parent is not None:
         item = by_name[item.parent]
@@ -218,52 +254,62 @@ def _world(by_name: dict[str | None, Object], item: Object) -> Array:
     return world
 
 
-def _corners(bounds: Array, world: Array) -> Array:
-    """(8, 3): the corners of the box, in world space."""
-    which = np.array([[i & 1, i >> 1 & 1, i >> 2 & 1] for i in range(8)])
-    return _placed(bounds[which, np.arange(3)], world)
-
-
 def _placed(points: Array, world: Array) -> Array:
+    """Returns the points (N, 3) transformed by an affine matrix (4, 4)."""
     placed: Array = points @ world[:3, :3].T + world[:3, 3]
     return placed
 
 
-def _draws_back_faces(item: Object, mesh: Mesh, material: Brdf, world: Array, box: Array, view: View) -> bool:
-    """Culling loses nothing where the mesh is solid and seen from outside; else both sides are drawn."""
-    sides: Literal["auto", "front", "both"] = item.sides if item.sides != "auto" else material.sides
+def _draws_back_faces(piece: _Piece, material: Brdf, view: View) -> bool:
+    """Whether an object's back faces are drawn.
+
+    By default they are culled where the mesh is solid and seen from outside, since none of them is visible then.
+    """
+    sides: Literal["auto", "front", "both"] = piece.item.sides if piece.item.sides != "auto" else material.sides
     if sides != "auto":
         return sides == "both"
-    if material.alpha_mode != "opaque" or not mesh.is_solid:
+    if material.alpha_mode != "opaque" or not piece.mesh.is_solid:
         return True
-    # The near plane may cut a solid open. Where it cuts the box, the mesh itself is asked.
-    if view.depth(box).min() > view.near:
+    # The near plane may cut a solid open, which shows its inside. The vertices are only tested if the plane cuts the box.
+    if view.depth(piece.box).min() > view.near:
         return False
-    return bool(view.depth(_placed(mesh.positions + mesh.origin, world)).min() <= view.near)
+    return bool(view.depth(piece.points()).min() <= view.near)
 
 
-def _needs_uvs(mesh: Mesh, material: Brdf) -> Iterator[str]:
-    if mesh.uvs is None:
-        for name in (*material.parameters(), "normal_map", "bump_map", "tangent_direction"):
-            if hasattr(getattr(material, name), "texture"):
-                yield f"its material's {name} is a texture, but its mesh has no texture coordinates"
+def _needs_uvs(piece: _Piece, material: Brdf) -> Iterator[str]:
+    """Yields a fault for each texture of the material if the mesh has no texture coordinates."""
+    if piece.mesh.uvs is None:
+        for key in (*material.parameters(), "normal_map", "bump_map", "tangent_direction"):
+            if hasattr(getattr(material, key), "texture"):
+                yield f"{piece.name}: its material's {key} is a texture, but its mesh has no texture coordinates"
 
 
-# What was made of a mesh goes with it: a mesh that is new in every frame leaves nothing behind.
+# mesh -> the meshes that `_ready` made from it, by the arguments of `_make`. They are freed together with the mesh, so that an
+# object with a new mesh in every frame does not fill the memory.
 _made: WeakKeyDictionary[Mesh, dict[tuple[object, ...], Mesh | None]] = WeakKeyDictionary()
 
 
 def _ready(mesh: Mesh, *wishes: Any) -> Mesh:
-    """The mesh with the attributes that its instance needs; the same object for the same wishes (`_make`)."""
-    made = _made.setdefault(mesh, {})
-    if wishes not in made:
+    """Returns the mesh with the attributes that its instance needs; the same object for the same mesh and wishes.
+
+    wishes: the further arguments of `_make`.
+    """
+    variants = _made.setdefault(mesh, {})
+    if wishes not in variants:
         ready = _make(mesh, *wishes)
-        # None stands for the mesh itself, which would else keep itself alive.
-        made[wishes] = None if ready is mesh else ready
-    return made[wishes] or mesh
+        # Store None for "unchanged": a value that refers to its own weak key would never be freed.
+        variants[wishes] = None if ready is mesh else ready
+    return variants[wishes] or mesh
 
 
 def _make(mesh: Mesh, flat: bool, normals: Normals, threshold: float, tangents: bool, levels: int) -> Mesh:
+    """Returns a mesh that is ready for one shading rate.
+
+    flat: whether each triangle gets vertices of its own, with the normal of the face.
+    normals, threshold: as in `with_normals`, [degrees].
+    tangents: whether the mesh gets tangents.
+    levels: how many times each triangle is cut into four.
+    """
     ready = mesh if flat and not tangents else with_normals(mesh, normals, threshold)
     if tangents:
         ready = with_tangents(ready)

@@ -1,4 +1,4 @@
-"""Clusters: neighbouring triangles that look the same way, so that those behind a solid are never handed to the GPU."""
+"""Culling: leaves out clusters of neighbouring triangles that turn their backs to the viewer, before they reach the GPU."""
 
 from __future__ import annotations
 
@@ -7,30 +7,34 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.assembly.assembly import Instance
-from glshade.mesh.mesh import Mesh, face_normals
+from glshade.assembly.instance import Instance
+from glshade.mesh.geometry import face_normals
+from glshade.mesh.mesh import Mesh
 from glshade.scene.camera import View
 
 Array = NDArray[np.float64]
 
-# Triangles a cluster: small enough to have one direction, large enough that asking costs less than drawing.
+# The number of triangles in a cluster. The normals of fewer triangles differ less; more triangles make the test cheaper.
 SIZE = 32
-# Below this many triangles there is nothing to gain.
+# A mesh with fewer triangles is drawn whole, because the test would cost more than it saves.
 WORTHWHILE = 4096
-# Rounding and sub-pixel snapping turn triangles that are seen edge-on; a cluster counts as hidden only beyond this sine.
+# The sine of a margin angle. Rounding and sub-pixel snapping may turn a triangle that is seen edge-on to the front. So a
+# cluster counts as hidden only if it is turned away from the viewer by more than this angle.
 EDGE_ON = 0.02
 
-
+# mesh -> the cones of its clusters, for as long as the mesh exists.
 _cones_of: WeakKeyDictionary[Mesh, tuple[Array, Array, Array, Array]] = WeakKeyDictionary()
 
 
 def _cones(mesh: Mesh) -> tuple[Array, Array, Array, Array]:
-    """(axis (K, 3), sine (K,), middle (K, 3), radius (K,)) of each full cluster, in the mesh's own space.
+    """Returns (axis (K, 3), sine (K,), middle (K, 3), radius (K,)) of the K full clusters, in object space.
 
-    No normal leaves its axis by more than the sine's angle; a cluster that looks everywhere has a sine above 1.
+    axis: the unit mean direction of the cluster's normals.
+    sine: the sine of the largest angle between the axis and a normal; 2 if an angle is 90 degrees or more.
+    middle, radius: the centre and the radius of the cluster's bounding sphere.
     """
     count = len(mesh.triangles) // SIZE
-    # One coordinate at a time: numpy is many times as fast along a long axis as along one of three.
+    # Each coordinate is handled by itself, since NumPy is many times faster along a long axis than along one of length 3.
     x, y, z = (np.ascontiguousarray(n).reshape(count, SIZE) for n in face_normals(mesh)[: count * SIZE].T)
     axis = np.stack([n.sum(axis=1) for n in (x, y, z)], axis=1)
     axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-30)
@@ -47,9 +51,10 @@ def _cones(mesh: Mesh) -> tuple[Array, Array, Array, Array]:
 
 
 def facing(instance: Instance, view: View) -> NDArray[np.uint32] | None:
-    """(N, 3) the triangles, without the clusters that show the viewer nothing but their backs; None: all of them.
+    """Returns the triangles (N, 3) without the clusters whose triangles all turn their backs to the viewer.
 
-    Shirman and Abi-Ezzi 1993's cone test, in the mesh's own space, where every affine transform keeps sides.
+    If all triangles are drawn, the result is None. The cone test of Shirman and Abi-Ezzi 1993 is made in object space, because
+    an affine transform keeps points on the same side of a triangle.
     """
     mesh = instance.mesh
     if instance.back_faces or len(mesh.triangles) < WORTHWHILE:
@@ -68,6 +73,6 @@ def facing(instance: Instance, view: View) -> NDArray[np.uint32] | None:
     if not hidden.any():
         return None
     whole = len(hidden) * SIZE
-    # A cluster at a time: numpy moves 32 triangles as fast as one.
-    shown = mesh.triangles[:whole].reshape(-1, 3 * SIZE)[~hidden].reshape(-1, 3)
-    return np.concatenate([shown, mesh.triangles[whole:]])
+    # Whole clusters are selected as rows, since NumPy copies 32 triangles in a row as fast as one.
+    visible = mesh.triangles[:whole].reshape(-1, 3 * SIZE)[~hidden].reshape(-1, 3)
+    return np.concatenate([visible, mesh.triangles[whole:]])

@@ -1,6 +1,6 @@
-"""Part: what of a scene a picture shows in place of all its light: one light's share, the highlights, a surface's place.
+"""Part: a picture that shows one part of a scene's light, or a property of its surfaces, in place of all the light.
 
-Every part is drawn like the picture itself, with the same geometry; a part says what each instance shows and what reaches it.
+A part is drawn like the picture itself, with the same geometry. It changes the values that instances write, and their lights.
 """
 
 from __future__ import annotations
@@ -8,7 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from glshade.assembly.assembly import Assembly, Instance
+from glshade.assembly.assembly import Assembly
+from glshade.assembly.instance import Instance
 from glshade.brdfs import BRDFS, Brdf
 from glshade.lights import LIGHTS, Light
 from glshade.scene.scene import Scene
@@ -16,17 +17,26 @@ from glshade.scene.scene import Scene
 
 @dataclass(frozen=True)
 class Part:
-    """kind: lit: all light, without the background; light: what one light adds, `light` its place among the assembly's;
-    specular: without diffuse lobes and ambient light; unlit: no light at all, which leaves the background; albedo: the
-    surfaces' own colours; depth, uv, normal: of the nearest surface at a pixel's middle, what is let through counting as
-    solid; depth has beside it which of the assembly's instances that is.
+    """One part of a scene's picture.
+
+    kind: the part that is shown:
+        "lit": all light, without the background;
+        "light": the light that one of the lights adds;
+        "specular": all light without diffuse lobes and ambient light;
+        "unlit": no light, so that only the background is left;
+        "albedo": the surfaces' base colours;
+        "depth": depth of the nearest surface at the pixel's middle, and the number of its instance in the assembly;
+        "uv": texture coordinates of the nearest surface at the pixel's middle;
+        "normal": shading normal of the nearest surface at the pixel's middle.
+        For the last three, blended surfaces count as opaque.
+    light: for the kind "light", index of the light in the assembly's lights.
     """
 
     kind: Literal["lit", "light", "specular", "unlit", "albedo", "depth", "uv", "normal"]
     light: int = 0
 
     def scene(self, scene: Scene) -> Scene:
-        """The scene, filmed as the part wants it: kept in float32, without what only the whole picture has."""
+        """Returns the scene with the film and the storage that the part needs. Only the kind "unlit" keeps the background."""
         changes: dict[str, Any] = {}
         if self.kind != "unlit":
             changes["background"] = (0.0, 0.0, 0.0, 0.0)
@@ -38,37 +48,43 @@ class Part:
         return scene.model_copy(update={"film": film, "quality": scene.quality.model_copy(update={"storage": None})})
 
     def of(self, assembly: Assembly) -> Assembly:
-        """The assembly that shows it."""
-        instances = tuple(self._instance(number, one, assembly.lights) for number, one in enumerate(assembly.instances))
+        """Returns the assembly whose picture is the part."""
+        instances = tuple(self._instance(number, item, assembly.lights) for number, item in enumerate(assembly.instances))
         return replace(assembly, instances=instances, lights=(_WHITE,) if self.kind == "albedo" else assembly.lights)
 
-    def _instance(self, number: int, one: Instance, lights: tuple[Light, ...]) -> Instance:
+    def _instance(self, number: int, instance: Instance, lights: tuple[Light, ...]) -> Instance:
+        """Returns an instance as the part shows it.
+
+        number: index of the instance in the assembly.
+        lights: the assembly's lights.
+        """
         if self.kind == "lit":
-            return one
+            return instance
         if self.kind == "unlit":
-            return replace(one, lights=())
+            return replace(instance, lights=())
         if self.kind == "light":
-            return replace(one, lights=tuple(i for i in one.lights if i == self.light))
+            return replace(instance, lights=tuple(i for i in instance.lights if i == self.light))
         if self.kind == "albedo":
-            return replace(one, material=_own_colour(one.material), lights=(0,))
+            return replace(instance, material=_own_colour(instance.material), lights=(0,))
         if self.kind == "specular":
-            part = one.material.specular_part()
-            directed = tuple(i for i in one.lights if not lights[i].omnidirectional)
-            return replace(one, material=part, lights=directed) if part else replace(one, lights=())
-        solid: Brdf = one.material
+            material = instance.material.specular_part()
+            directed = tuple(i for i in instance.lights if not lights[i].omnidirectional)
+            return replace(instance, material=material, lights=directed) if material else replace(instance, lights=())
+        solid: Brdf = instance.material
         if solid.alpha_mode == "blend":
             solid = solid.model_copy(update={"alpha_mode": "opaque"})
-        # A mesh without texture coordinates is black. All but the normal is a matter of the pixel, whatever the shading rate.
-        shows = "light" if self.kind == "uv" and one.mesh.uvs is None else self.kind
-        rate = one.rate if self.kind == "normal" else "phong"
-        return replace(one, material=solid, lights=(), number=number, rate=rate, shows=shows)
+        # A mesh without texture coordinates shows its light, which is black because no light reaches it.
+        shows = "light" if self.kind == "uv" and instance.mesh.uvs is None else self.kind
+        # Depth and texture coordinates are per pixel whatever the shading rate; the normal depends on the rate.
+        rate = instance.rate if self.kind == "normal" else "phong"
+        return replace(instance, material=solid, lights=(), number=number, rate=rate, shows=shows)
 
 
 _WHITE: Any = LIGHTS["ambient"].model_validate({"intensity": 1.0})
 
 
 def _own_colour(material: Brdf) -> Brdf:
-    """The material in whose place ambient light shows its base colour; itself where it has none."""
+    """Returns a material that shows the base colour of this one under white ambient light; without one, this material."""
     base = material.base()
     if base is None:
         return material

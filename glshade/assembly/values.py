@@ -1,4 +1,4 @@
-"""Values: an assembly's numbers as both renderers are given them, rounded once to float32."""
+"""Values: the numbers of materials, transforms and lights that both renderers are given."""
 
 from __future__ import annotations
 
@@ -12,22 +12,25 @@ from numpy.typing import NDArray
 from glshade.arrays import rounded
 from glshade.assembly.assembly import Assembly
 from glshade.brdfs import Array, Brdf, parameter_values
-from glshade.lights import Falloff, Light
+from glshade.lights import FALLOFFS, Falloff, Light
 from glshade.textures.texture import DirectionMap, Texture
 
 
 def direction(material: Brdf) -> Array:
-    """(2,): cos and sin of the angle by which tangents are turned."""
+    """Returns the cosine and sine (2,) of the angle by which the material turns tangents."""
     angle = math.radians(turn(material) % 360)
     return np.array([math.cos(angle), math.sin(angle)])
 
 
 def normal_matrix(linear: Array) -> Array:
-    """(3, 3): the direction of the inverse transpose, as the cofactor matrix over its largest entry.
+    """Returns the matrix (3, 3) that transforms normals, which is a multiple of the inverse transpose.
 
-    The sign of the determinant keeps normals on the outside of mirrored objects. Scaled first, so that 1e-200 does not vanish.
+    It is the cofactor matrix divided by its largest entry. The sign of the determinant keeps the normals of mirrored objects
+    on the outside.
+    linear: the linear part (3, 3) of the transform of points.
     """
-    # Plain numbers: numpy takes twenty times as long for nine.
+    # The matrix is scaled first, so that products of tiny entries such as 1e-200 do not underflow to 0. Python's numbers are
+    # twenty times faster than NumPy for nine entries.
     (a, b, c), (d, e, f), (g, h, i) = (linear / np.abs(linear).max()).tolist()
     cofactors = np.array(
         [
@@ -42,52 +45,62 @@ def normal_matrix(linear: Array) -> Array:
 
 
 def light_values(light: Light, eye: Array, exposure: float) -> dict[str, NDArray[np.float32]]:
-    """The GLSL struct's fields. The intensity comes with exposure, and with the pi of pi (f cos) I."""
+    """Returns the fields of a light's GLSL struct, rounded to float32.
+
+    The intensity I is multiplied by the exposure, and for a directed light also by pi: a surface with the BRDF f reflects
+    pi f cos I, where cos is the cosine between its normal and the light's direction.
+    eye: position of the viewer (3,) [scene units].
+    exposure: exposure of the film [stops].
+    """
     values = light.uniforms(eye)
     gain = 2.0**exposure * (1.0 if light.omnidirectional else math.pi)
     values["intensity"] = values["intensity"] * gain
     if "r_min" in values:
-        # float32 ends at 3e38, and infinite light from no direction would be NaN.
+        # At the light's own position its strength must stay below 3e38, where float32 ends: infinity times the cosine 0 is NaN.
         strongest = float(np.abs(values["intensity"]).max())
         values["r_min"] = max(values["r_min"], least_distance(strongest, getattr(light, "falloff", "none")))
     return {name: rounded(value) for name, value in values.items()}
 
 
-# The strongest light that a point is given.
+# The strongest light that a light with a falloff may shed on a point, below the largest float32 of 3e38.
 BRIGHTEST = 1e38
 
 
-FALLOFF_POWERS: dict[Falloff, int] = {"none": 0, "1/r": 1, "1/r^2": 2}
-
-
 def least_distance(strength: float, falloff: Falloff) -> float:
-    """The r_min [scene units] below which light of that strength exceeds BRIGHTEST: 2e-19 for 1/r^2 and a strength of 4."""
-    power = FALLOFF_POWERS[falloff]
-    # 4e-38 is the least: a normal number, as is its inverse.
+    """Returns the distance at which light of this strength reaches BRIGHTEST [scene units]; 0 without a falloff.
+
+    For 1/r^2 and a strength of 4 the distance is 2e-19.
+    """
+    power = FALLOFFS[falloff].power
+    # With a strength of at least 4, distance^power is at least 4e-38: it and its inverse are normal numbers in float32.
     return (max(strength, 4.0) / BRIGHTEST) ** (1 / power) if power else 0.0
 
 
 def ambient_intensity(assembly: Assembly, chosen: tuple[int, ...], exposure: float) -> Array:
-    """(3,) float64: ambient lights add up before they are rounded."""
+    """Returns the sum (3,) of the chosen lights that are the same for every normal, in float64, with exposure.
+
+    chosen: indices into the assembly's lights.
+    exposure: exposure of the film [stops].
+    """
     total = np.zeros(3)
     for index in chosen:
         light = assembly.lights[index]
-        if light.omnidirectional:
+        if light.ignores_normal:
             total += light.uniforms(assembly.view.eye)["intensity"] * 2.0**exposure
     return total
 
 
 def ambient_reflectance(material: Brdf) -> Array:
-    """(3,): what it reflects of ambient light, where it asks for no texture."""
+    """Returns the share (3,) of ambient light that a material reflects, if the share does not depend on a texture."""
     values: dict[str, Any] = {}
     for name, value in parameter_values(material).items():
-        # What does not count may be one all the same: any number stands for it.
+        # A parameter that the ambient reflectance does not use may still be a texture: its factor stands in for it.
         given = (value.factor if material.is_colour(name) else value.factor[0]) if isinstance(value, Texture) else value
         values[name] = np.asarray(given, dtype=np.float64)
     return type(material).ambient_reflectance(SimpleNamespace(**values, **material.chosen()))
 
 
 def turn(material: Brdf) -> float:
-    """How far the tangents, or the directions that take their place, are turned [degrees]."""
+    """Returns the angle by which tangents, or the directions of a direction map, are turned [degrees]."""
     direction = material.tangent_direction
     return direction.rotate if isinstance(direction, DirectionMap) else direction

@@ -1,1 +1,1 @@
-"""Batch: several pictures, made by workers of their own, so that what crashes takes one picture with it and no more."""
+"""Batch: renders several pictures in worker processes, so that a driver crash costs at most one picture."""

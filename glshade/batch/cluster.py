@@ -1,7 +1,8 @@
-"""Cluster: a batch's workers on dask.distributed, of this machine or of many. Used as a Pool is; the pictures are the same.
+"""Cluster: the engine with workers of dask.distributed, on this machine or on many. It makes the same pictures as a Pool.
 
-A dask task is a parcel of pictures. The scheduler runs it again elsewhere where its worker dies, unasked; so every picture
-takes along when its file was last written, and a file that is newer by then is asked for its digest before anything is drawn.
+A dask task is a parcel of pictures. If the worker of a parcel dies, the scheduler runs the parcel again on another worker
+without asking. So every picture is sent with the time at which its file was last written. If the file is newer when the parcel
+runs, the digest in the file decides whether the picture has to be drawn again.
 """
 
 from __future__ import annotations
@@ -11,71 +12,65 @@ import os
 import queue
 import re
 import signal
-import socket
 import warnings
 from collections import deque
 from collections.abc import Iterable, Iterator, Sequence
-from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
+from concurrent.futures import CancelledError
 from dataclasses import dataclass, replace
-from functools import cache
 from itertools import islice
-from time import monotonic, perf_counter
+from time import monotonic
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from glshade.batch import leftovers
-from glshade.batch.digest import code
-from glshade.batch.maker import Drawn, Maker
-from glshade.batch.pool import RETRIES, SLOW, interrupts
+from glshade.batch.digest import code_digest
+from glshade.batch.engine import RETRIES, SLOW, interrupts
+from glshade.batch.parcel import DEVICE, Conditions, forget, time_written
 from glshade.batch.record import Record
 from glshade.batch.task import Task
-from glshade.batch.worker import SOFTWARE, WRITERS, fault
 from glshade.errors import ContextError, GlshadeError, MissingLibrary
 from glshade.version import __version__
 
 if TYPE_CHECKING:
     import distributed
 
+# The address for which a scheduler and workers are started on this machine.
 LOCAL = "local"
+# The pattern of a scheduler's address.
 ADDRESS = re.compile(r"(tcp|tls)://[^/\s]+:\d+")
-# The environment of a worker says here which of EGL's devices is its own.
-DEVICE = "GLSHADE_DEVICE"
-# The resource that workers with a GPU declare: where some do, the others are left alone.
+# Name of the dask resource that workers with a GPU declare. If any worker declares it, only those workers get pictures.
 GPU = "GPU"
-# A parcel takes about this long [s], against the 5 to 10 ms that dask takes for it, and has no more pictures than this.
+# Time that a parcel should take [s], which is much longer than the 5 to 10 ms that dask needs for a task; and largest number of
+# pictures in a parcel.
 PARCEL_SECONDS, PARCEL_PICTURES = 0.25, 32
-# Parcels that a worker has at most: one to draw, one to begin while dask hears of the first.
+# Largest number of parcels for each worker: one that it draws, and another that it can begin while dask handles the first.
 AHEAD = 2
-# A scheduler that is there answers within this [s].
+# Timeout for the connection to a scheduler [s].
 CONNECTING = 10.0
-# The workers are counted again after this [s]: they come and go. A thousand of them are a message of about a megabyte.
+# Time after which the workers are counted again, because they come and go [s]. They are not counted more often, because a list
+# of 1,000 workers has about a megabyte.
 COUNTING = 5.0
-# Without a worker for this long, there is something to say [s]; a cluster of our own will then never have one.
+# Time without any worker after which the user is warned [s]. A local cluster fails after this time, because it gets no further
+# workers.
 LONELY = 30.0
-# While nothing is heard, this often somebody looks why [s].
+# Longest wait for a parcel, after which the state of the scheduler is checked [s].
 GLANCE = 0.5
 
 
 def check_address(address: str) -> None:
-    """Errors: ValueError."""
+    """Checks that an address is "local" or has the form of a scheduler's address. Errors: ValueError."""
     if address != LOCAL and not ADDRESS.fullmatch(address):
         raise ValueError(f"{address!r} is neither {LOCAL} nor a scheduler's address such as tcp://host:8786")
 
 
-class How(TypedDict):
-    """What all pictures of a batch have in common. code: what the client would make them with. hardware: on a GPU, or not."""
-
-    code: str
-    backend: str
-    device: int | None
-    reference: bool
-    hardware: bool
-
-
 @dataclass(frozen=True)
 class Ordered:
-    """A task, and when its file had been written when the task was given out [ns]; 0 where there was none."""
+    """A task that is handed out.
+
+    task: the picture to make
+    written: time at which the output file was last written before the task was handed out [ns]; 0 if there was no file
+    """
 
     task: Task
     written: int
@@ -83,114 +78,27 @@ class Ordered:
 
 @dataclass(frozen=True)
 class Parcel:
-    """What a dask task makes. alone: nothing else of the batch is under way."""
+    """The pictures of one dask task.
+
+    future: the dask task
+    orders: the pictures
+    alone: True if no other parcel of the batch runs at the same time
+    """
 
     future: distributed.Future[Any]
     orders: tuple[Ordered, ...]
     alone: bool
 
 
-# ---- in the workers
-
-
-@cache
-def _thread() -> ThreadPoolExecutor:
-    """The one thread of this process that draws: a context is a thread's, and dask may have given the worker several."""
-    return ThreadPoolExecutor(1, thread_name_prefix="glshade")
-
-
-_makers: dict[tuple[str, int | None], Maker] = {}
-
-
-def make(orders: Sequence[tuple[dict[str, Any], int]], how: How) -> dict[str, Any]:
-    """A parcel, in a worker: (Task.as_dict(), Ordered.written). What draws, how long it took, and the records, as dictionaries.
-
-    Errors: ContextError where nothing can be drawn with; GlshadeError where this is not the client's glshade.
-    """
-    return _thread().submit(_make_here, orders, how).result()
-
-
-def _make_here(orders: Sequence[tuple[dict[str, Any], int]], how: How) -> dict[str, Any]:
-    if code() != how["code"]:
-        raise GlshadeError(
-            f"the worker on {socket.gethostname()} has another glshade (version {__version__}), other shaders or another "
-            "OpenImageIO than this command: install the same everywhere, and start the workers again"
-        )
-    device = int(os.environ.get(DEVICE, -1))
-    key = how["backend"], how["device"] if device < 0 else device
-    maker = _makers.get(key) or _makers.setdefault(key, Maker(*key))  # type: ignore[arg-type]
-    try:
-        driver = "float64 reference" if how["reference"] else maker.driver
-    except ContextError as error:
-        raise ContextError(f"the worker on {socket.gethostname()}: {error}") from None
-    if how["hardware"] and any(name in driver.lower() for name in SOFTWARE):
-        on = "the driver's own choice" if key[1] is None else f"EGL device {key[1]}"
-        raise ContextError(f"the worker on {socket.gethostname()} has a GPU, but {on} draws on the CPU: {driver}; see {DEVICE}")
-    begun = perf_counter()
-    made: list[Future[Record]] = []
-    with ThreadPoolExecutor(WRITERS) as writers:
-        for data, written in orders:
-            if len(made) > WRITERS:
-                # One is drawn while the others are written; more would only take memory.
-                made[-WRITERS - 1].result()
-            task = Task.from_dict(data)
-            try:
-                drawn: Drawn | Record = maker.draw(replace(task, resume=task.resume or _written(task.output) != written))
-            except Exception as error:
-                drawn = fault(task.number, task.output, error)
-            if isinstance(drawn, Record) and drawn.state == "skipped" and not task.resume:
-                # The worker that made it died before it could say so.
-                drawn = replace(drawn, state="done")
-            made.append(writers.submit(_write, drawn))
-    records = [record.result().as_dict() for record in made]
-    return {"driver": driver, "seconds": perf_counter() - begun, "records": records}
-
-
-def _write(drawn: Drawn | Record) -> Record:
-    if isinstance(drawn, Record):
-        return drawn
-    try:
-        return drawn.write()
-    except Exception as error:
-        return fault(drawn.record.number, drawn.record.output, error)
-
-
-def _forget() -> None:
-    """Gives the contexts back, when what is being drawn is done."""
-
-    def close() -> None:
-        for maker in _makers.values():
-            maker.close()
-        _makers.clear()
-
-    _thread().submit(close)
-
-
-def _written(output: str) -> int:
-    try:
-        return os.stat(output).st_mtime_ns
-    except OSError:
-        return 0
-
-
-def dask_setup(worker: Any) -> None:
-    """Called by dask in workers of our own, on their main thread: Ctrl-C is the client's to hear, and stdout its own."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    # Drivers print.
-    os.dup2(2, 1)
-
-
-# ---- in the client
-
-
 def _sendable() -> Any:
-    """`make`, in a form that goes by value: dask's schedulers and workers take no notice of glshade before it runs.
+    """Returns a function that calls `make`. It is a local function, so dask pickles it by value.
 
-    A worker without glshade would die of a function that it cannot import; of this one it says so.
+    A worker without glshade would die while it unpickles `make` itself. It can unpickle the local function. When it calls that
+    function, the import of `make` fails, and dask reports the error.
     """
 
     def imported(*arguments: Any) -> Any:
-        from glshade.batch.cluster import make
+        from glshade.batch.parcel import make
 
         return make(*arguments)
 
@@ -198,12 +106,19 @@ def _sendable() -> Any:
 
 
 class Cluster:
-    """Workers, by a scheduler's address or, "local", started at once. A context manager.
+    """The workers of a scheduler, or workers on this machine, which the constructor starts. This class is a context manager.
 
-    devices: of "local", the EGL device of each worker, None for the driver's own choice; of a scheduler, the first is for
-    workers whose environment has no GLSHADE_DEVICE. hardware: whether those of local workers are GPUs. shares: whether local
-    workers share the cores to draw. retries: how often a picture whose worker died is made again.
-    Errors: MissingLibrary, ValueError for an address, GlshadeError where no scheduler answers or none can be started.
+    address: address of a scheduler, or "local"
+    devices: EGL device of each local worker, None if the driver chooses. With a scheduler, only the first device counts: it is
+        for workers whose environment has no GLSHADE_DEVICE
+    backend: OpenGL backend, as for Renderer
+    reference: True if the float64 reference draws
+    hardware: True if the devices of local workers are GPUs
+    shares: True if local workers share the cores for drawing
+    shaders: the user's own shader folders
+    models: the user's own model folders
+    retries: number of times that a picture is made again after its worker died
+    Errors: MissingLibrary; ValueError for an address; GlshadeError if no scheduler answers or none can be started.
     """
 
     def __init__(
@@ -215,6 +130,8 @@ class Cluster:
         reference: bool = False,
         hardware: bool = False,
         shares: bool = False,
+        shaders: Sequence[str] = (),
+        models: Sequence[str] = (),
         retries: int = RETRIES,
     ) -> None:
         check_address(address)
@@ -222,7 +139,7 @@ class Cluster:
             import distributed
         except ImportError:
             raise MissingLibrary("--cluster needs dask.distributed: pip install 'glshade[dist]'") from None
-        # What goes wrong is said here, and once.
+        # dask would log every fault several times, so its logs are turned off. This class reports each fault once.
         for name in ("distributed", "distributed.client"):
             logging.getLogger(name).setLevel(logging.CRITICAL)
         self.address = address
@@ -230,10 +147,12 @@ class Cluster:
         self._drivers: set[str] = set()
         self._retries = retries
         self._local = _started(devices, hardware, shares) if address == LOCAL else None
-        self._how: How = {
-            "code": code(),
+        self._conditions: Conditions = {
+            "code": code_digest(shaders),
             "backend": backend,
             "device": None if self._local else devices[0],
+            "shaders": list(map(os.path.abspath, shaders)),
+            "models": list(map(os.path.abspath, models)),
             "reference": reference,
             "hardware": False,
         }
@@ -244,16 +163,21 @@ class Cluster:
             raise GlshadeError(f"no dask scheduler answers at {address}: {_one_line(error)}") from None
         self._name = f"glshade-{uuid4().hex[:8]}"
         self._sent = 0
+        # Key of a dask task -> parcel, for parcels that are handed out; and the keys of dask tasks that are finished.
         self._flight: dict[str, Parcel] = {}
         self._arrived: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._waiting: Iterator[Task] = iter(())
+        # Pictures whose worker died. Each of them is made again while nothing else of the batch runs.
         self._suspects: deque[Ordered] = deque()
+        # Task number -> number of workers that died while they made it.
         self._deaths: dict[int, int] = {}
-        # What workers that died had been given.
+        # Output files of the parcels whose workers died. Incomplete temporary files may lie beside them.
         self._spoiled: list[str] = []
+        # Workers that died before they could draw.
         self._stillborn = 0
-        # Of the latest parcel: seconds a picture; how many pictures the next has.
+        # Time for one picture in the latest parcel [s], and number of pictures in the next parcel.
         self._each, self._size = 0.0, 1
+        # Time at which the workers were last counted, and time at which there last was a worker, both by `monotonic` [s].
         self._counted = self._seen = monotonic()
         self.jobs, self._resources = 0, dict[str, float]()
         self._stopping = self._lonely = False
@@ -263,26 +187,26 @@ class Cluster:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
-        """Nothing of ours is left: no process, no context, no file half-written by workers of our own."""
-        given = [order.task.output for parcel in self._flight.values() for order in parcel.orders]
-        if self._local is None and not given and self.driver and self._client.status == "running":
-            self._client.run(_forget, on_error="ignore")
+        """Ends local workers and removes their incomplete files. Workers of a scheduler only release their contexts."""
+        outputs = [order.task.output for parcel in self._flight.values() for order in parcel.orders]
+        if self._local is None and not outputs and self.driver and self._client.status == "running":
+            self._client.run(forget, on_error="ignore")
         self._client.close(timeout=CONNECTING)
         if self._local is not None:
-            self._close_local(at_once=bool(given))
-            # Not earlier: a worker that is lost may not have ended, and what runs is left alone.
-            leftovers.remove([*given, *self._spoiled])
+            self._close_local(at_once=bool(outputs))
+            # Only now have all processes ended. Before, `remove` would have left the files of running processes alone.
+            leftovers.remove([*outputs, *self._spoiled])
 
     def stop(self) -> None:
-        """Nothing more is handed out; what is will be finished."""
+        """Stops handing out tasks. The tasks that are handed out already are finished."""
         self._stopping = True
 
     def ready(self) -> str:
-        """Waits for the first worker, and says what it draws with. Errors: as `records`."""
+        """Waits for the first worker, and returns the name of its driver. Errors: as for `records`."""
         with interrupts(self.stop) as interrupted:
             self._send(())
             while not self.driver and not self._stopping:
-                for _ in self._hear():
+                for _ in self._listen():
                     pass
         if interrupted:
             raise KeyboardInterrupt
@@ -290,38 +214,39 @@ class Cluster:
         return self.driver
 
     def records(self, tasks: Iterable[Task]) -> Iterator[Record]:
-        """What comes of the tasks, in the order in which it does.
+        """Yields the tasks' records, in the order in which the parcels are finished.
 
-        Errors: ContextError where a worker cannot draw; GlshadeError where the scheduler is lost, or a worker has another
-        glshade. Ctrl-C stops, and raises KeyboardInterrupt when what is handed out is finished; a second one raises it at once.
+        Errors: ContextError if a worker cannot draw; GlshadeError if the scheduler is lost, or if a worker's glshade differs;
+        KeyboardInterrupt after Ctrl-C, once the tasks that are handed out are finished. A second Ctrl-C raises it at once.
         """
         self._waiting = iter(tasks)
         with interrupts(self.stop) as interrupted:
             while self._feed():
-                yield from self._hear()
+                yield from self._listen()
         if interrupted:
             raise KeyboardInterrupt
 
     def _feed(self) -> bool:
-        """Hands out what there is. Whether anything is still to come."""
+        """Hands out tasks until the workers have no room for more. Returns whether further records will come."""
         room = (1 if self._each > SLOW else AHEAD) * max(self.jobs, 1)
         while not self._stopping and len(self._flight) < room:
             tasks = [*islice(self._waiting, self._size)]
             if not tasks:
                 break
-            self._send([Ordered(task, _written(task.output)) for task in tasks])
+            self._send([Ordered(task, time_written(task.output)) for task in tasks])
         if self._suspects and not self._flight and not self._stopping:
-            # By itself, so that it is certain who dies of it.
+            # The suspect runs alone: if its worker dies again, this picture is certainly the cause.
             self._send([self._suspects.popleft()], alone=True)
         return bool(self._flight)
 
     def _send(self, orders: Sequence[Ordered], alone: bool = False) -> None:
+        """Submits a parcel. A parcel without pictures only asks for the name of a worker's driver."""
         self._sent += 1
         key = f"{self._name}-{self._sent}"
         future = self._client.submit(
             _sendable(),
             [(order.task.absolute().as_dict(), order.written) for order in orders],
-            {**self._how},
+            {**self._conditions},
             key=key,
             resources=self._resources or None,
             pure=False,
@@ -329,57 +254,67 @@ class Cluster:
         self._flight[key] = Parcel(future, tuple(orders), alone)
         future.add_done_callback(lambda future: self._arrived.put(future.key))
 
-    def _hear(self) -> Iterator[Record]:
-        """Waits a moment for a parcel."""
+    def _listen(self) -> Iterator[Record]:
+        """Waits up to GLANCE for a finished parcel, and yields its records."""
         try:
             parcel = self._flight.pop(self._arrived.get(timeout=GLANCE))
         except queue.Empty:
             self._look()
             return
-        yield from self._opened(parcel)
+        yield from self._records(parcel)
         if monotonic() > self._counted + COUNTING:
             self._count()
 
-    def _opened(self, parcel: Parcel) -> Iterator[Record]:
+    def _records(self, parcel: Parcel) -> Iterator[Record]:
+        """Yields the records of a finished parcel, or handles its failure. Errors: as for `records`."""
         from distributed import KilledWorker
 
         try:
-            made = parcel.future.result()
+            result = parcel.future.result()
         except KilledWorker as error:
             yield from self._killed(parcel, error)
         except GlshadeError as error:
-            # dask's way to it is nobody's business.
+            # The traceback through dask's code would not help the user.
             raise error.with_traceback(None) from None
         except (CancelledError, OSError, TimeoutError):
             self._raise_lost()
         except (ImportError, RuntimeError) as error:
             raise GlshadeError(
-                f"a worker of {self.address} cannot run glshade {__version__}: {_one_line(error)}; install the same there"
+                f"a worker of {self.address} cannot run glshade {__version__}: {_one_line(error)}; "
+                "install the same version there"
             ) from None
         else:
-            yield from self._made(parcel, made)
+            yield from self._finished(parcel, result)
 
-    def _made(self, parcel: Parcel, made: dict[str, Any]) -> Iterator[Record]:
+    def _finished(self, parcel: Parcel, result: dict[str, Any]) -> Iterator[Record]:
+        """Yields the records of a parcel that `make` has made, and sets the size of the next one."""
         self._seen = monotonic()
-        self.driver = self.driver or made["driver"]
-        if made["driver"] not in self._drivers and self._drivers:
-            warnings.warn(f"the workers have several drivers, whose pictures differ: {made['driver']}", stacklevel=2)
-        self._drivers.add(made["driver"])
+        driver = result["driver"]
+        self.driver = self.driver or driver
+        if driver not in self._drivers and self._drivers:
+            warnings.warn(
+                f"the workers have different drivers, whose pictures may differ; another one is {driver}", stacklevel=2
+            )
+        self._drivers.add(driver)
         if parcel.orders:
-            self._each = made["seconds"] / len(parcel.orders)
-            # Not at once: the first picture of a worker takes longer than the others, and the first of a scene too.
+            self._each = result["seconds"] / len(parcel.orders)
+            # The size grows slowly, because the first picture of a worker or of a scene takes longer than the others.
             self._size = max(1, min(2 * self._size, PARCEL_PICTURES, int(PARCEL_SECONDS / max(self._each, 1e-6))))
-        for order, data in zip(parcel.orders, made["records"], strict=True):
+        for order, data in zip(parcel.orders, result["records"], strict=True):
             attempts = self._deaths.pop(order.task.number, 0) + 1
             yield replace(Record.from_dict(data), output=order.task.output, attempts=attempts)
 
     def _killed(self, parcel: Parcel, error: distributed.KilledWorker) -> Iterator[Record]:
-        """Each is made again by itself, so that the culprit is certain; the culprit, as often as is allowed."""
+        """Handles a parcel that killed its workers, and yields the records of pictures that have no retries left.
+
+        The other pictures are made again, one at a time while nothing else runs. So it becomes certain which of them kills its
+        worker.
+        """
         deaths = error.allowed_failures + 1
         if not parcel.orders:
             self._stillborn += deaths
             if self._stillborn > self._retries:
-                raise ContextError(f"the driver ends the process that opens it: {self._stillborn} workers died of it")
+                raise ContextError(f"the driver ends the process that opens it: {self._stillborn} workers died")
             self._send(())
         self._spoiled.extend(order.task.output for order in parcel.orders)
         for order in parcel.orders:
@@ -387,13 +322,16 @@ class Cluster:
             self._deaths[number] = self._deaths.get(number, 0) + deaths
             if parcel.alone and self._deaths[number] > self._retries:
                 attempts = self._deaths.pop(number)
-                said = f"{output}: the worker that drew it died, {attempts} times: a fault of the driver, or too little memory?"
-                yield Record(number, output, "failed", attempts=attempts, error=said, exit_code=1)
+                message = f"{output}: the worker that drew it died, {attempts} times: the driver crashed, or memory ran out"
+                yield Record(number, output, "failed", attempts=attempts, error=message, exit_code=1)
             else:
                 self._suspects.append(order)
 
     def _look(self) -> None:
-        """When nothing is heard: is anybody there?"""
+        """Checks that the scheduler is connected and has workers, after a wait in which no parcel was finished.
+
+        Errors: GlshadeError.
+        """
         if self._client.status not in {"running", "connecting"}:
             self._raise_lost()
         if monotonic() > self._counted + COUNTING:
@@ -402,31 +340,33 @@ class Cluster:
             self._seen = monotonic()
         elif monotonic() > self._seen + LONELY and not self._lonely:
             if self._local is not None:
-                raise GlshadeError(f"no worker has lived on this machine for {LONELY:.0f} s")
+                raise GlshadeError(f"no worker process could be kept running on this machine for {LONELY:.0f} s")
             self._lonely = True
-            warnings.warn(f"the scheduler at {self.address} has no workers: waiting for the first", stacklevel=2)
+            warnings.warn(f"the scheduler at {self.address} has no workers; waiting for the first one", stacklevel=2)
 
     def _count(self) -> None:
-        """How many workers there are, and whether they have to be asked for by their GPUs."""
+        """Counts the workers. If some declare a GPU, only those are counted, and parcels require the resource."""
         try:
             workers = self._client.scheduler_info(n_workers=-1)["workers"].values()
         except (OSError, TimeoutError):
             self._raise_lost()
         with_gpu = [worker for worker in workers if worker["resources"].get(GPU, 0) >= 1]
         self.jobs, self._resources = len(with_gpu or workers), {GPU: 1.0} if with_gpu else {}
-        self._how["hardware"] = bool(with_gpu) and not self._how["reference"]
+        self._conditions["hardware"] = bool(with_gpu) and not self._conditions["reference"]
         self._counted = monotonic()
 
     def _raise_lost(self) -> None:
+        """Raises the error of a lost scheduler. Errors: GlshadeError, always."""
         raise GlshadeError(
-            f"the scheduler at {self.address} is lost; the pictures that are there count: go on with --resume when it is back"
+            f"the scheduler at {self.address} is lost; finished pictures are kept: continue with --resume when it is back"
         ) from None
 
     def _close_local(self, at_once: bool = False) -> None:
+        """Ends the local cluster, if there is one. at_once: True kills the workers instead of waiting for their pictures."""
         if self._local is None:
             return
         if at_once:
-            # Those that draw would be waited for.
+            # `close` would wait for the workers that draw.
             for worker in self._local.workers.values():
                 process = worker.process and worker.process.process
                 if process is not None:
@@ -436,12 +376,16 @@ class Cluster:
 
 
 def _started(devices: Sequence[int | None], hardware: bool, shares: bool) -> distributed.SpecCluster:
-    """A scheduler in this process, and a worker for each device. (LocalCluster's workers have one environment in common.)"""
+    """Starts a scheduler in this process, and a worker process for each device.
+
+    dask's LocalCluster cannot be used here, because all its workers have the same environment variables.
+    Errors: GlshadeError if they cannot be started.
+    """
     import dask
     from distributed import Nanny, Scheduler, SpecCluster
 
     host = "127.0.0.1"
-    # llvmpipe would start a thread for every core in every worker.
+    # Without LP_NUM_THREADS, llvmpipe would start a thread for every core in every worker.
     common = {"LP_NUM_THREADS": os.environ.get("LP_NUM_THREADS", "0")} if shares else {}
     workers = {
         number: {
@@ -450,17 +394,18 @@ def _started(devices: Sequence[int | None], hardware: bool, shares: bool) -> dis
                 "host": host,
                 "nthreads": 1,
                 "resources": {GPU: 1} if hardware else {},
-                # Pictures are not dask's data: it would pause or kill for what the driver holds.
+                # 0 means no limit. With a limit, dask would pause or kill workers for memory of the driver that dask cannot
+                # free.
                 "memory_limit": 0,
                 "dashboard": False,
                 "env": common if device is None else {**common, DEVICE: str(device)},
-                "preload": [__name__],
+                "preload": ["glshade.batch.parcel"],
             },
         }
         for number, device in enumerate(devices)
     }
-    # What dies is looked into here, after one death. A worker that is drawing may not answer for minutes.
-    # Any free port for its HTTP server too: of two clusters on a machine the second would warn that it is not the first.
+    # allowed_failures 0: the Cluster handles a parcel after one death of its worker. worker-ttl None: a worker that draws may
+    # not answer for minutes. Port 0 for the HTTP server: a second cluster on this machine would warn that the default is taken.
     free = {"port": 0, "dashboard_address": f"{host}:0"}
     options = {"host": host, **free, "dashboard": False, "allowed_failures": 0}
     quiet = {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical"}
@@ -472,4 +417,5 @@ def _started(devices: Sequence[int | None], hardware: bool, shares: bool) -> dis
 
 
 def _one_line(error: BaseException) -> str:
+    """Returns an error's message on one line, or the name of its class if it has none."""
     return "; ".join(line.strip() for line in str(error).splitlines() if line.strip()) or type(error).__name__

@@ -1,4 +1,4 @@
-"""Frames: which pictures a command makes of its scenes, and the names of their files."""
+"""Frames: lists the pictures that a command makes of its scenes, and names their files."""
 
 from __future__ import annotations
 
@@ -9,18 +9,24 @@ from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 
-# The largest number of frames that a range may hold: a slip of the keyboard is not a month of work.
+# Largest number of frames in a range, so that a typing error does not start a month of work.
 MOST = 10_000_000
-# What a pattern leaves open.
+# A placeholder in a pattern: one or more # for the digits of the frame number, or a {name}.
 PLACE = re.compile(r"#+|\{(.*?)\}")
-# Of a value, what a file's name does not hold.
+# Characters of a sweep's key or value that are replaced in a file name.
 UNNAMED = re.compile(r"[^\w.+-]+")
 
 
 @dataclass(frozen=True)
-class Picture:
-    """One picture to make. overrides: what a sweep puts in the place of the scene's values. frame None: the scene as it is
-    written; camera None: its own."""
+class Shot:
+    """One picture to make.
+
+    scene: path of the scene or mesh file
+    overrides: (key, text) pairs of the sweeps, as --set takes them
+    frame: frame number of the animation; None draws the scene without animation
+    camera: name of one of the scene's `cameras`; None selects the scene's main camera
+    output: path of the picture file
+    """
 
     scene: Path
     overrides: tuple[tuple[str, str], ...]
@@ -31,19 +37,23 @@ class Picture:
 
 @dataclass(frozen=True)
 class Sweep:
-    """A key of the scene, dotted as --set takes it, and the texts of the values that it has in turn."""
+    """A key of the scene and the values that it takes one after another.
+
+    key: dotted key, as --set takes it
+    values: texts of the values
+    """
 
     key: str
     values: tuple[str, ...]
 
     @property
     def short(self) -> str:
-        """The key's last part."""
+        """The last part of the key, without quotes."""
         return self.key.rpartition(".")[2].strip("\"'")
 
 
 def parse(text: str) -> list[int]:
-    """The frames of a range such as 1-100x5, 1,3,7-9 or, as Blender writes it, 1..100. Errors: ValueError."""
+    """Returns the frames of a range such as 1-100x5, 1,3,7-9 or, in Blender's notation, 1..100. Errors: ValueError."""
     from fileseq.exceptions import FileSeqException
     from fileseq.frameset import FrameSet
 
@@ -57,7 +67,7 @@ def parse(text: str) -> list[int]:
 
 
 def parse_sweep(text: str) -> Sweep:
-    """The sweep of KEY=a,b,c. Commas within brackets or quotes are a value's own. Errors: ValueError."""
+    """Returns the sweep of KEY=a,b,c. Commas within brackets or quotes belong to a value. Errors: ValueError."""
     from glshade.scene.override import ASSIGNMENT, pairs
 
     match = ASSIGNMENT.fullmatch(text)
@@ -70,7 +80,7 @@ def parse_sweep(text: str) -> Sweep:
 
 
 def _split(text: str) -> Iterator[str]:
-    """The parts between the commas that stand outside of brackets and quotes."""
+    """Yields the parts of a text between the commas that are outside of brackets and quotes."""
     depth, quote, start = 0, "", 0
     for index, letter in enumerate(text):
         if quote:
@@ -93,57 +103,81 @@ def pictures(
     cameras: Sequence[str],
     pattern: str | None,
     sweeps: Sequence[Sweep] = (),
-) -> Iterator[Picture]:
-    """Every frame of every scene at every value of the sweeps through every camera, in the order in which it is said.
+) -> Iterator[Shot]:
+    """Yields one picture for each combination of a scene, the sweeps' values, a camera and a frame; the frame varies fastest.
 
-    pattern: a file's name with {scene}, {camera}, a sweep's {key} or its last part, and a # for each digit of the frame; left
-    out: NAME.png, and what it takes to tell the pictures apart. Errors: ValueError where two pictures would have one name, or
-    the pattern says what is not there.
+    scenes: paths of scene or mesh files
+    frames: frame numbers; None draws the scenes without animation
+    cameras: names of cameras; empty selects each scene's main camera
+    pattern: file name with {scene}, {camera}, a sweep's {key} or the last part of its key, and one # for each digit of the
+        frame; None selects SCENE.png with the parts inserted that differ between the pictures
+    sweeps: keys with the values that they take
+    Errors: ValueError if two pictures would have the same name, or if the pattern has an unknown placeholder.
     """
     short = Counter(sweep.short for sweep in sweeps)
     if pattern is None:
-        keys = [sweep.short if short[sweep.short] == 1 else sweep.key for sweep in sweeps]
-        swept = "".join(f".{UNNAMED.sub('_', key)}-{{{sweep.key}}}" for key, sweep in zip(keys, sweeps, strict=True))
-        pattern = "{scene}" + swept + ".{camera}" * bool(cameras) + ".####" * (frames is not None) + ".png"
-    known = {"scene", "camera", *(sweep.key for sweep in sweeps), *(name for name, count in short.items() if count == 1)}
-    named = {match[1] for match in PLACE.finditer(pattern) if match[1] is not None}
-    if named - known:
-        places = ", ".join(f"{{{name}}}" for name in ("scene", "camera", *sorted(known - {"scene", "camera"})))
-        raise ValueError(f"{pattern!r}: {{{min(named - known)}}} is not known; known: {places} and # for digits of the frame")
-    if "#" in pattern and frames is None:
-        raise ValueError(f"{pattern!r} has a place for frames: say which, by --frames")
-    made: set[Path] = set()
+        pattern = _default_pattern(frames, cameras, sweeps, short)
+    _check_pattern(pattern, frames, sweeps, short)
+    outputs: set[Path] = set()
     for scene in scenes:
         for values in product(*(sweep.values for sweep in sweeps)):
             overrides = tuple((sweep.key, value) for sweep, value in zip(sweeps, values, strict=True))
             words = {sweep.short: value for sweep, value in zip(sweeps, values, strict=True)} | dict(overrides)
             words = {key: UNNAMED.sub("_", value).strip("_") for key, value in words.items()}
-            for camera in (*cameras,) or (None,):
-                # The scene's and the camera's name come last: a sweep of a key called so does not.
-                of = words | {"scene": scene.stem, "camera": camera or "camera"}
-                for frame in (*(frames or ()),) or (None,):
-                    output = Path(_named(pattern, of, frame))
-                    if output in made:
-                        raise ValueError(
-                            f"{pattern!r} gives several pictures one name: it lacks {_lack(pattern, sweeps, cameras, frames)}"
-                        )
-                    made.add(output)
-                    yield Picture(scene, overrides, frame, camera, output)
+            for camera in cameras or (None,):
+                # The names of scene and camera win over a sweep whose key ends in "scene" or "camera".
+                parts = words | {"scene": scene.stem, "camera": camera or "camera"}
+                for frame in frames or (None,):
+                    output = Path(_named(pattern, parts, frame))
+                    if output in outputs:
+                        missing = _missing_place(pattern, sweeps, cameras, frames)
+                        raise ValueError(f"{pattern!r} gives several pictures the same name: it lacks {missing}")
+                    outputs.add(output)
+                    yield Shot(scene, overrides, frame, camera, output)
+
+
+def _default_pattern(frames: Sequence[int] | None, cameras: Sequence[str], sweeps: Sequence[Sweep], short: Counter[str]) -> str:
+    """Returns the pattern of SCENE.png, with placeholders for sweeps, camera and frame if there are any.
+
+    short: last part of a key -> number of sweeps whose keys end with it
+    """
+    keys = [sweep.short if short[sweep.short] == 1 else sweep.key for sweep in sweeps]
+    swept = "".join(f".{UNNAMED.sub('_', key)}-{{{sweep.key}}}" for key, sweep in zip(keys, sweeps, strict=True))
+    camera = ".{camera}" if cameras else ""
+    frame = ".####" if frames is not None else ""
+    return "{scene}" + swept + camera + frame + ".png"
+
+
+def _check_pattern(pattern: str, frames: Sequence[int] | None, sweeps: Sequence[Sweep], short: Counter[str]) -> None:
+    """Checks a pattern. Errors: ValueError for an unknown placeholder, or for a # if there are no frames.
+
+    short: last part of a key -> number of sweeps whose keys end with it
+    """
+    known = {"scene", "camera", *(sweep.key for sweep in sweeps), *(name for name, count in short.items() if count == 1)}
+    used = {match[1] for match in PLACE.finditer(pattern) if match[1] is not None}
+    if used - known:
+        places = ", ".join(f"{{{name}}}" for name in ("scene", "camera", *sorted(known - {"scene", "camera"})))
+        raise ValueError(f"{pattern!r}: {{{min(used - known)}}} is not known; known: {places} and # for digits of the frame")
+    if "#" in pattern and frames is None:
+        raise ValueError(f"{pattern!r} has a # for the frame number, but there are no frames: add --frames")
 
 
 def _named(pattern: str, words: Mapping[str, str], frame: int | None) -> str:
+    """Returns the pattern with its placeholders filled in. words: placeholder -> text."""
+
     def fill(place: re.Match[str]) -> str:
         if place[1] is not None:
             return words[place[1]]
         assert frame is not None
-        # `#` is one digit each; a minus comes before them.
-        return f"{'-' * (frame < 0)}{abs(frame):0{len(place[0])}d}"
+        # Each # is one digit; a minus sign comes before them.
+        sign = "-" if frame < 0 else ""
+        return f"{sign}{abs(frame):0{len(place[0])}d}"
 
     return PLACE.sub(fill, pattern)
 
 
-def _lack(pattern: str, sweeps: Sequence[Sweep], cameras: Sequence[str], frames: Sequence[int] | None) -> str:
-    """The place that would tell the pictures apart."""
+def _missing_place(pattern: str, sweeps: Sequence[Sweep], cameras: Sequence[str], frames: Sequence[int] | None) -> str:
+    """Returns a placeholder that is missing in the pattern: with it, the pictures would have different names."""
     if frames is not None and len(frames) > 1 and "#" not in pattern:
         return "#"
     for sweep in sweeps:

@@ -1,4 +1,4 @@
-"""Jobs: how many worker processes a batch has, and on which devices."""
+"""Jobs: chooses the number of worker processes of a batch, and their devices."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ import os
 from itertools import cycle, islice
 from pathlib import Path
 
-# A further worker takes about half a second of a core to start, and so pays for a few pictures at least.
+# One worker is started for this many pictures. More workers would not pay: to start one takes half a second of a core.
 WORTH = 4
-# Without one of these, Linux has no driver for a GPU, and asking EGL for it would take 80 ms.
+# Device files of GPU drivers. If none of them exists, there is no GPU. EGL is then not asked for devices, which takes 80 ms.
 NODES = ("/dev/dri", "/dev/nvidiactl", "/dev/dxg")
 
 
 def cores() -> int:
-    """The cores that this process may use."""
+    """Returns the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def gpus() -> list[int]:
-    """EGL's devices that are not the CPU. Errors: ContextError."""
+    """Returns the indices of the EGL devices that are hardware. Errors: ContextError."""
     if not any(Path(node).exists() for node in NODES):
         return []
     from glshade.gl.context import devices
@@ -27,10 +27,11 @@ def gpus() -> list[int]:
 
 
 def devices(jobs: int | None, pictures: int, on: list[int]) -> list[int | None]:
-    """The EGL device of each worker, None for the driver's own choice.
+    """Returns the EGL device of each worker; None leaves the choice to the driver.
 
-    jobs: how many, where that is said. on: the devices to share, in turn; one worker each. Without any, the CPU draws: with a
-    worker a core.
+    jobs: number of workers; None starts one for each device of `on` or, without devices, one for each core
+    pictures: number of pictures to make, which limits the default number of workers
+    on: EGL devices, which the workers take in turn; empty if the CPU draws
     """
     if jobs is None:
         jobs = min(len(on), pictures) if on else min(cores(), -(-pictures // WORTH))

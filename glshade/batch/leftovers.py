@@ -1,4 +1,4 @@
-"""Leftovers: what a process that was killed had begun to write beside pictures."""
+"""Leftovers: removes temporary files that killed processes left beside pictures."""
 
 from __future__ import annotations
 
@@ -9,20 +9,24 @@ from pathlib import Path
 
 from glshade.files import beside
 
+# The process id in a temporary file's name, which `files.beside` puts before the suffix: .NAME.PROCESS.png.
 NUMBER = re.compile(r"\.(\d+)(?=\.\w+$)")
 
 
 def remove(outputs: Iterable[str | Path]) -> None:
-    """Removes what processes that are gone left beside these files, in one look at each folder."""
+    """Removes temporary files beside these picture files, if their processes have ended. Each folder is listed only once."""
+    # This import is late, because it imports NumPy. A pool starts its workers before the slow import of NumPy.
+    from glshade.image.layers import layers_path
+
     folders: dict[Path, set[str]] = {}
     for output in map(Path, outputs):
-        folders.setdefault(output.parent, set()).update((output.name, f"{output.stem}.aovs.exr"))
+        folders.setdefault(output.parent, set()).update((output.name, layers_path(output).name))
     for folder, names in folders.items():
         try:
-            found = [name for name in os.listdir(folder) if name.startswith(".")]
+            hidden = [name for name in os.listdir(folder) if name.startswith(".")]
         except OSError:
             continue
-        for name in found:
+        for name in hidden:
             match = NUMBER.search(name)
             if match is None or is_running(int(match[1])):
                 continue
@@ -32,7 +36,7 @@ def remove(outputs: Iterable[str | Path]) -> None:
 
 
 def is_running(process: int) -> bool:
-    """Whether there is a process of this number."""
+    """Returns whether a process with this id exists."""
     try:
         os.kill(process, 0)
     except ProcessLookupError:

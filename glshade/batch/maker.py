@@ -1,4 +1,4 @@
-"""Maker: makes the pictures of tasks, and keeps what the next one needs too: the context, the scenes, what they compile to."""
+"""Maker: makes the pictures of tasks, and keeps the context, scene files and compiled programs for the next task."""
 
 from __future__ import annotations
 
@@ -13,155 +13,182 @@ from typing import TYPE_CHECKING, Any, cast
 
 from pydantic import ValidationError
 
-from glshade.batch.digest import ATTRIBUTE, digest, digest_of
+from glshade.batch.digest import ATTRIBUTE, code_digest, digest_of, picture_digest
 from glshade.batch.record import Record
 from glshade.batch.task import Task
 from glshade.errors import GlshadeError, SceneError
-from glshade.image.file import FLOAT_SUFFIXES
+from glshade.image.file import format_of
 from glshade.image.image import Image
 from glshade.scene.file import SceneFile
-from glshade.scene.scene import Film, Scene
+from glshade.scene.film import Film
+from glshade.scene.models import Folders, paths, use_models
+from glshade.scene.scene import Scene
 
 if TYPE_CHECKING:
     from glshade.gl.context import Backend
     from glshade.gl.renderer import Renderer
     from glshade.image.layers import Layers
 
-# What a picture may fail by without being a fault in glshade.
+# Errors that are not bugs in glshade. They become failed records.
 FAULTS = (GlshadeError, OSError, MemoryError)
-# Scene files at hand: a sweep has one for each of its values, and goes through them once.
+# Capacity of the LRU cache of scene files. A small one is enough: a sweep has an entry for each of its values, but uses one
+# entry after another.
 KEPT_FILES = 16
-# A look at whether a folder takes a file as large as the picture's pixels goes no further than this [bytes].
+# Largest size of the temporary file that is written to test whether a folder has room for a picture [bytes].
 MOST_PROBED = 64 << 20
 
 
 class Maker:
-    """Makes pictures on one context, opened at the first need. backend, device: as for Renderer.
+    """Makes pictures with one OpenGL context, which is opened when it is first needed.
 
-    A context belongs to the thread that uses it first: so does a Maker; only `Drawn.write` may be called from another.
+    An OpenGL context belongs to the thread that uses it first, so all methods of a Maker must be called from one thread. Only
+    `Drawn.write` may be called from another thread.
     """
 
-    def __init__(self, backend: Backend = "auto", device: int | None = None) -> None:
-        self.backend, self.device = backend, device
+    def __init__(
+        self,
+        backend: Backend = "auto",
+        device: int | None = None,
+        shaders: Folders | None = None,
+        models: Folders | None = None,
+    ) -> None:
+        """Takes the arguments of Renderer, and the user's own model folders. Errors: SceneError for a model folder."""
+        use_models(models)
+        self.backend, self.device, self.shaders = backend, device, paths(shaders)
         self._renderer: Renderer | None = None
         self._files: OrderedDict[Any, SceneFile] = OrderedDict()
-        # The last scene as its file has it, the film's changes, and it on the changed film: still frames share one.
+        # A cache of one entry: the last scene from a file, the task's changes to it, and the changed scene. So frames without
+        # animation share one scene object, and the renderer prepares it only once.
         self._filmed: tuple[Scene, Any, Scene] | None = None
 
     def close(self) -> None:
-        """Gives the context back."""
+        """Releases the context."""
         if self._renderer is not None:
             self._renderer.release()
             self._renderer = None
 
     @property
     def renderer(self) -> Renderer:
-        """Errors: ContextError."""
+        """The renderer, which opens the context on first use. Errors: ContextError."""
         if self._renderer is None:
             from glshade.gl.renderer import Renderer
 
-            self._renderer = Renderer(self.backend, self.device)
+            self._renderer = Renderer(self.backend, self.device, shaders=self.shaders)
         return self._renderer
 
     @property
     def driver(self) -> str:
-        """What draws, in the driver's words. Errors: ContextError."""
+        """OpenGL's renderer and version, as the driver reports them. Errors: ContextError."""
         return f"{self.renderer.context.renderer}; {self.renderer.context.version}"
 
+    @property
+    def code(self) -> str:
+        """The digest of the code, as `code_digest` returns it. Errors: ShaderError."""
+        return code_digest(self.shaders)
+
     def make(self, task: Task) -> Record:
-        """Draws and writes. What fails by a fault of FAULTS gives a record that says so."""
+        """Draws and writes a picture. An error of FAULTS is not raised but returned as a failed record."""
         drawn = self.draw(task)
         return drawn if isinstance(drawn, Record) else drawn.write()
 
     def draw(self, task: Task, scene: Scene | None = None) -> Drawn | Record:
-        """The picture in memory; or a record, where there is nothing to write: it failed, or task.resume finds it in its file.
+        """Draws a picture into memory.
 
-        scene: the task's, where the caller has it already.
+        Returns a record instead if there is nothing to write: the picture failed, or task.resume is set and the file holds the
+        picture already.
+        task: the picture to draw
+        scene: the scene of the task, if the caller has loaded it already
         """
-        with warnings.catch_warnings(record=True) as heard:
+        with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             try:
-                found = self._draw(task, scene)
+                result = self._draw(task, scene)
             except FAULTS as error:
-                found = _failed(task, error)
-        said = tuple(dict.fromkeys(str(warning.message) for warning in heard))
-        return replace(found, warnings=said) if said else found
+                result = _failed(task, error)
+        messages = tuple(dict.fromkeys(str(warning.message) for warning in caught))
+        return replace(result, warnings=messages) if messages else result
 
     def _draw(self, task: Task, scene: Scene | None) -> Drawn | Record:
-        begun = perf_counter()
+        start = perf_counter()
         if scene is None:
             scene = self.scene(task)
         driver = "float64 reference" if task.reference else self.driver
-        name = digest(scene, task, driver)
-        made = Record(task.number, task.output, "done", name, driver=driver, device=self.device)
+        name = picture_digest(scene, task, driver, self.code)
+        record = Record(task.number, task.output, "done", name, driver=driver, device=self.device)
         if task.resume and all(digest_of(file) == name for file in _files(task, scene)):
-            return replace(made, state="skipped", **_contents(task.output))
+            return replace(record, state="skipped", **_contents(task.output))
         loaded, started = perf_counter(), time()
         picture = self._picture(task, scene)
-        seconds = {"load": loaded - begun, "draw": perf_counter() - loaded}
-        return Drawn(picture, replace(made, seconds=seconds, started=started))
+        seconds = {"load": loaded - start, "draw": perf_counter() - loaded}
+        return Drawn(picture, replace(record, seconds=seconds, started=started))
 
     def _picture(self, task: Task, scene: Scene) -> Image | Layers:
-        linear = Path(task.output).suffix.lower() in FLOAT_SUFFIXES
+        linear = format_of(task.output).floats
         shading = cast(Any, task.shading)
         if task.reference:
-            from glshade.image.view import shown
-            from glshade.reference import render
+            from glshade.image.view import displayed
+            from glshade.reference.picture import render
 
             if scene.film.aovs:
                 raise SceneError(f"{task.scene}: film.aovs: the reference draws the picture alone, without layers")
             image = render(scene, shading=shading)
-            return image if linear else shown(image, scene.film)
+            film = scene.film
+            return image if linear else displayed(image, film.encoding, ocio=film.ocio, display=film.display, view=film.view)
         draw = self.renderer.layers if scene.film.aovs else self.renderer.render
         return draw(scene, dtype="float32" if linear else "uint8", shading=shading, tile=task.tile)
 
     def scene(self, task: Task) -> Scene:
-        """The scene that a task draws. Errors: SceneError."""
+        """Returns the scene that a task draws. Errors: SceneError."""
         key = task.scene, task.overrides
         file = self._files.pop(key, None) or SceneFile(task.scene, task.overrides)
         self._files[key] = file
         if len(self._files) > KEPT_FILES:
             self._files.popitem(last=False)
-        written = file.scene(task.frame, task.camera)
+        original = file.scene(task.frame, task.camera)
         changes = dict(task.film), task.settings
-        if self._filmed is None or self._filmed[0] is not written or self._filmed[1] != changes:
-            self._filmed = written, changes, _changed(written, task)
+        if self._filmed is None or self._filmed[0] is not original or self._filmed[1] != changes:
+            self._filmed = original, changes, _changed(original, task)
         return self._filmed[2]
 
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A picture that is drawn and not yet written."""
+    """A picture that is drawn and not yet written.
+
+    picture: the pixels, with layers if the film asks for them
+    record: the record of the picture, complete except for the fields about the file
+    warnings: messages of the warnings raised while it was drawn
+    """
 
     picture: Image | Layers
     record: Record
     warnings: tuple[str, ...] = ()
 
     def write(self) -> Record:
-        """Writes the file, on any thread. A file that cannot be written gives a record that says so."""
+        """Writes the file and returns the record. Any thread may call this; an error of FAULTS becomes a failed record."""
         record = replace(self.record, warnings=self.warnings)
-        begun = perf_counter()
+        start = perf_counter()
         path = Path(record.output)
         try:
             self.picture.save(path, {ATTRIBUTE: record.digest})
             contents = _contents(path)
         except FAULTS as error:
-            place = _fault_of_place(path, self._size)
-            # What the writer of a format says of a full disk, if anything, is less clear.
-            message = f"{path}: cannot be written: {place}" if place and path.parent.is_dir() else str(error)
+            fault = _fault_of_folder(path, self._size)
+            # If the disk is full, the operating system's message is clearer than that of the library that writes the format.
+            message = f"{path}: cannot be written: {fault}" if fault and path.parent.is_dir() else str(error)
             code = getattr(error, "exit_code", 1)
-            return replace(record, state="failed", error=message, exit_code=code, stops=bool(place))
-        return replace(record, seconds={**record.seconds, "write": perf_counter() - begun}, finished=time(), **contents)
+            return replace(record, state="failed", error=message, exit_code=code, stops=bool(fault))
+        return replace(record, seconds={**record.seconds, "write": perf_counter() - start}, finished=time(), **contents)
 
     @property
     def _size(self) -> int:
-        """About how large the file may become [bytes]."""
+        """The size of the pixels in memory [bytes]. The file is hardly larger."""
         image = self.picture if isinstance(self.picture, Image) else self.picture.image
         return image.pixels.nbytes
 
 
 def _changed(scene: Scene, task: Task) -> Scene:
-    """The scene on the task's film and at its settings. Errors: SceneError."""
+    """Returns the scene with the task's film and settings. Errors: SceneError."""
     if task.film:
         try:
             film = Film.model_validate({**scene.film.model_dump(), **task.film})
@@ -170,7 +197,7 @@ def _changed(scene: Scene, task: Task) -> Scene:
             raise SceneError(f"{task.scene}: film.{'.'.join(map(str, first['loc']))}: {first['msg']}") from None
         scene = scene.model_copy(update={"film": film})
     if task.settings is not None:
-        from glshade.tradeoff.budget import applied
+        from glshade.tradeoff.choice import applied
         from glshade.tradeoff.setting import Setting
 
         scene = applied(scene, tuple(Setting(**setting) for setting in task.settings))
@@ -178,16 +205,17 @@ def _changed(scene: Scene, task: Task) -> Scene:
 
 
 def _files(task: Task, scene: Scene) -> list[Path]:
-    """What there is where the picture is done."""
+    """Returns the files that a task writes: the picture, and a file of layers if the picture's format cannot hold them."""
     output = Path(task.output)
-    if not scene.film.aovs or output.suffix.lower() == ".exr":
+    if not scene.film.aovs or format_of(output).layers:
         return [output]
-    from glshade.image.layers import beside
+    from glshade.image.layers import layers_path
 
-    return [output, beside(output)]
+    return [output, layers_path(output)]
 
 
 def _failed(task: Task, error: BaseException) -> Record:
+    """Returns the record of a task that failed by this error."""
     message = str(error) or type(error).__name__
     if isinstance(error, OSError) and error.filename:
         message = f"{error.filename}: {error.strerror}"
@@ -197,13 +225,16 @@ def _failed(task: Task, error: BaseException) -> Record:
 
 
 def _contents(path: str | Path) -> dict[str, Any]:
-    """A file's hash and size."""
+    """Returns a file's hash and size, as fields of a Record."""
     data = Path(path).read_bytes()
     return {"sha256": hashlib.sha256(data).hexdigest(), "size": len(data)}
 
 
-def _fault_of_place(path: Path, size: int) -> str:
-    """Why the folder takes no file of about this size [bytes], or nothing: whether the next picture fails by the same."""
+def _fault_of_folder(path: Path, size: int) -> str:
+    """Returns the reason why no file of about this size [bytes] can be written to the folder of `path`; "" if one can.
+
+    If there is a reason, the next picture would fail for it too.
+    """
     try:
         with TemporaryFile(dir=path.parent) as file:
             file.write(bytes(min(size, MOST_PROBED)))

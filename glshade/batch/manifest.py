@@ -1,4 +1,4 @@
-"""Manifest: what came of every picture of a batch, one JSON object a line. A log: of an output, the last line holds."""
+"""Manifest: an append-only log of a batch's pictures, one JSON object a line; the last line about a file is the valid one."""
 
 from __future__ import annotations
 
@@ -10,17 +10,20 @@ from types import TracebackType
 from typing import Any
 
 from glshade.batch.record import Record
-from glshade.batch.task import Task, said
+from glshade.batch.task import Task, without_empty
 from glshade.errors import GlshadeError
 
 
 class Manifest:
-    """The file, open to be added to. A context manager. Errors: GlshadeError where it cannot be read or written."""
+    """The log file, open for appending. This class is a context manager.
+
+    Errors: GlshadeError if the file cannot be read or written.
+    """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._folder = path.resolve().parent
-        # output -> digest and hash, where it is done.
+        # Output path -> (digest, SHA-256 of the file), for pictures that are done according to their last line.
         self._done: dict[str, tuple[str, str]] = {}
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_CLOEXEC", 0), 0o666)
@@ -36,9 +39,11 @@ class Manifest:
         os.close(self._file)
 
     def add(self, task: Task, record: Record) -> None:
-        """A line for the record. None for what is skipped and has its line; a picture whose line was lost gets it now.
+        """Appends a line for the record.
 
-        Errors: GlshadeError, such as for a full disk.
+        A skipped picture gets no line if the log says already that it is done. That line is missing if the process was killed
+        before it wrote the line; the line is then written now.
+        Errors: GlshadeError if the line cannot be written, as on a full disk.
         """
         output = os.path.relpath(os.path.abspath(record.output), self._folder)
         known = not record.digest or self._done.get(output) == (record.digest, record.sha256)
@@ -47,7 +52,7 @@ class Manifest:
         line: dict[str, Any] = {"output": output, "state": "failed" if record.state == "failed" else "done"}
         line |= {"scene": task.scene, "frame": task.frame, "camera": task.camera, "overrides": dict(task.overrides)}
         line |= {key: value for key, value in record.as_dict().items() if key not in ("number", "output", "state", "stops")}
-        data = json.dumps(said(line)).encode() + b"\n"
+        data = json.dumps(without_empty(line)).encode() + b"\n"
         try:
             written = os.write(self._file, data)
         except OSError as error:
@@ -57,7 +62,7 @@ class Manifest:
         self._note(line)
 
     def _read(self) -> None:
-        """What is done, from whole lines; what a kill left of another goes."""
+        """Collects the finished pictures, and cuts off an incomplete last line that a killed process left."""
         whole = 0
         with open(self._file, "rb", closefd=False) as file:
             for data in file:

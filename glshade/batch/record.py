@@ -1,4 +1,4 @@
-"""Record: what came of a task."""
+"""Record: the result of one task, as the manifest and the progress display need it."""
 
 from __future__ import annotations
 
@@ -6,19 +6,31 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any, Literal
 
-from glshade.batch.task import said
+from glshade.batch.task import without_empty
 
 State = Literal["done", "skipped", "failed"]
 
 
 @dataclass(frozen=True)
 class Record:
-    """What came of a task.
+    """The result of one task.
 
-    number, output: the task's. digest: of all that the picture depends on, as it stands in the file. sha256, size: of the
-    file [bytes]. seconds: by load, draw and write. started, finished: Unix times, when drawing began and when the file was
-    closed [s]. device: the worker's EGL device, None for the driver's own choice. error: a line a fault. stops: the fault is
-    the place's (a full disk, a folder without rights), and the next pictures would have it too.
+    number: index of the task in the batch
+    output: path of the picture file
+    state: "done", "skipped" (the file already held the picture) or "failed"
+    digest: SHA-256 of everything that the picture depends on, as the file stores it; "" if unknown
+    sha256: SHA-256 of the file's bytes; "" if the file was not read
+    size: size of the file [bytes]
+    seconds: step ("load", "draw" or "write") -> time spent in it [s]
+    started: Unix time when drawing began [s]
+    finished: Unix time when the file was closed [s]
+    driver: OpenGL's renderer and version, or "float64 reference"
+    device: EGL device of the worker; None if the driver chose
+    attempts: number of times the picture was begun; more than 1 if a worker died
+    error: message of the failure, one line for each fault
+    exit_code: exit code that belongs to the failure, as docs/exit-codes.md lists them
+    stops: True if the next pictures would fail for the same reason, such as a full disk or a folder without write permission
+    warnings: messages of the warnings raised while the picture was made
     """
 
     number: int
@@ -39,10 +51,10 @@ class Record:
     warnings: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: what is not left out."""
-        return said({f.name: getattr(self, f.name) for f in fields(self)})
+        """Returns the fields as JSON types, without empty values."""
+        return without_empty({f.name: getattr(self, f.name) for f in fields(self)})
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Record:
-        """What as_dict made, through JSON or not."""
+        """Returns the record whose `as_dict` gave the data. The data may have been written to JSON and read back."""
         return cls(**{**data, "warnings": tuple(data.get("warnings", ()))})

@@ -1,4 +1,4 @@
-"""Task: one picture to make, in texts and numbers, so that any process on any machine can make it."""
+"""Task: one picture to make, described by strings and numbers so that any process on any machine can make it."""
 
 from __future__ import annotations
 
@@ -12,9 +12,18 @@ from typing import Any
 class Task:
     """One picture to make.
 
-    number: its place in the batch. scene, output: files, as they were said. overrides: (key, text), as `glshade.load` takes
-    them. frame, camera: None is the scene as it is written. film: changes of the film's keys. settings: a budget's choice,
-    one a knob's values for each object (`Setting.as_dict`). resume: a file that has this very picture is left as it is.
+    number: index of the picture in the batch
+    scene: path of the scene or mesh file, as the user gave it
+    output: path of the picture file, as the user gave it
+    overrides: (key, text) pairs, as `glshade.load` takes them
+    frame: frame number of the animation; None draws the scene without animation
+    camera: name of one of the scene's `cameras`; None selects the scene's main camera
+    film: keys of the film with the values that replace the scene's
+    shading: "flat", "gouraud" or "phong" for the whole picture; None keeps each object's own
+    reference: True draws with the float64 reference
+    tile: largest side of a region that is drawn in one piece [pixels]; None leaves it to the renderer
+    settings: `Setting.as_dict` of each object, as --budget or --deadline chose them; None keeps the scene's settings
+    resume: True leaves the output file alone if it already holds this picture, which the digest in the file shows
     """
 
     number: int
@@ -31,21 +40,21 @@ class Task:
     resume: bool = False
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: what is not left out."""
-        return said({f.name: getattr(self, f.name) for f in fields(self)})
+        """Returns the fields as JSON types, without empty values."""
+        return without_empty({f.name: getattr(self, f.name) for f in fields(self)})
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Task:
-        """What as_dict made, through JSON or not."""
+        """Returns the task whose `as_dict` gave the data. The data may have been written to JSON and read back."""
         settings = data.get("settings")
         overrides = tuple((key, text) for key, text in data.get("overrides", ()))
         return cls(**{**data, "overrides": overrides, "settings": settings and tuple(settings)})
 
     def absolute(self) -> Task:
-        """The same for a process with another working folder."""
+        """Returns the task with absolute paths, for a process that has another working directory."""
         return replace(self, scene=os.path.abspath(self.scene), output=os.path.abspath(self.output))
 
 
-def said(values: Mapping[str, Any]) -> dict[str, Any]:
-    """Without what says nothing: None, False and what is empty. A whole number always does: there is a frame 0."""
+def without_empty(values: Mapping[str, Any]) -> dict[str, Any]:
+    """Returns the values without None, False and empty ones. Integers stay, because 0 is a frame number."""
     return {name: value for name, value in values.items() if value or type(value) is int}

@@ -1,7 +1,8 @@
-"""The worker process: tasks on stdin, one JSON object a line; what comes of them on stdout.
+"""Worker: the process of a Pool that reads tasks from stdin and writes events to stdout, one JSON object a line.
 
-It says `hello` with its driver, or `unusable` with the reason; then `began` and the task's number where drawing begins, and
-`record`. It ends when stdin does, and so when its parent dies; told to terminate, it finishes what it has begun.
+The first event is `hello` with the driver, or `unusable` with the reason. For each task, `began` with the task's number is sent
+when drawing begins, and `record` when the file is written. The process ends when stdin is closed. stdin is closed, too, when
+the parent process dies. On SIGTERM, the process finishes the pictures that it has begun and ends.
 """
 
 from __future__ import annotations
@@ -11,61 +12,64 @@ import os
 import signal
 import sys
 import threading
-import traceback
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from glshade.batch.engine import WRITERS, fault
 from glshade.batch.maker import Drawn, Maker
 from glshade.batch.record import Record
 from glshade.batch.task import Task
-from glshade.errors import ContextError
-
-# Threads that write: a PNG takes up to twice as long to encode as to draw.
-WRITERS = 2
-# Renderers that are the CPU.
-SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "software rasterizer")
+from glshade.errors import GlshadeError
 
 
 class Worker:
-    """Draws on the main thread, in the order of the tasks, and writes on others."""
+    """Draws on the main thread, in the order of the tasks, and writes files on other threads."""
 
-    def __init__(self, maker: Maker, events: int) -> None:
-        """events: the descriptor that events are written to."""
-        self.maker = maker
+    maker: Maker
+
+    def __init__(self, events: int) -> None:
+        """Takes the file descriptor to which events are written."""
         self._events = events
         self._lock = threading.Lock()
-        # One picture is drawn while the others are written; more would only take memory.
+        # Limits the number of pictures in memory: one is drawn while each writer writes one. More pictures would take memory
+        # and save no time.
         self._room = threading.BoundedSemaphore(WRITERS + 1)
         self._stopping = threading.Event()
 
     def stop(self, *_: Any) -> None:
-        """Begins nothing more."""
+        """Lets no further picture begin."""
         self._stopping.set()
 
-    def open(self, reference: bool) -> bool:
-        """Whether there is something to draw with; says so."""
-        if reference:
-            self._say({"hello": {"driver": "float64 reference", "on_cpu": True}})
-            return True
+    def open(self, reference: bool, arguments: dict[str, Any]) -> bool:
+        """Makes the maker, opens the driver, sends `hello` or `unusable`, and returns whether pictures can be drawn.
+
+        reference: True if the float64 reference draws, which needs no driver.
+        arguments: the arguments of Maker.
+        """
         try:
+            self.maker = Maker(**arguments)
+            if reference:
+                self._send({"hello": {"driver": "float64 reference", "on_cpu": True}})
+                return True
             driver = self.maker.driver
-        except ContextError as error:
-            self._say({"unusable": str(error)})
+        except GlshadeError as error:
+            self._send({"unusable": str(error)})
             return False
-        self._say({"hello": {"driver": driver, "on_cpu": any(name in driver.lower() for name in SOFTWARE)}})
+        self._send({"hello": {"driver": driver, "on_cpu": self.maker.renderer.context.is_software}})
         return True
 
     def work(self) -> None:
-        """Until stdin ends."""
+        """Makes the pictures until stdin is closed."""
         parent = os.getppid()
         with ThreadPoolExecutor(WRITERS) as writers:
             for line in sys.stdin.buffer:
-                # A parent that is gone leaves an orphan.
+                # If the parent has died, the operating system gives this process another parent. Nobody needs its pictures
+                # then.
                 if self._stopping.is_set() or os.getppid() != parent:
                     return
                 task = Task.from_dict(json.loads(line))
                 self._room.acquire()
-                self._say({"began": task.number})
+                self._send({"began": task.number})
                 try:
                     drawn = self.maker.draw(task)
                 except Exception as error:
@@ -83,38 +87,35 @@ class Worker:
         self._finish(record)
 
     def _finish(self, record: Record) -> None:
-        self._say({"record": record.as_dict()})
+        self._send({"record": record.as_dict()})
         self._room.release()
 
-    def _say(self, event: dict[str, Any]) -> None:
+    def _send(self, event: dict[str, Any]) -> None:
         data = json.dumps(event, separators=(",", ":")).encode() + b"\n"
         with self._lock:
             try:
                 while data:
                     data = data[os.write(self._events, data) :]
             except BrokenPipeError:
-                # Nobody listens: the pictures are files all the same.
+                # The parent has died. No further picture is begun, and those that are begun are still written.
                 self._stopping.set()
 
 
-def fault(number: int, output: str, error: Exception) -> Record:
-    """What is none of FAULTS is a fault in glshade, and no reason to leave the other pictures unmade."""
-    traceback.print_exc()
-    return Record(number, output, "failed", error=f"{output}: {type(error).__name__}: {error}", exit_code=1)
-
-
 def main() -> None:
-    """Arguments: backend, device or "-", and "reference" where no driver is needed."""
-    backend, device, *rest = sys.argv[1:]
+    """Runs a worker. Its command-line argument is a JSON object with the arguments of Maker, and with `reference`.
+
+    reference: true if the float64 reference draws.
+    """
+    arguments = json.loads(sys.argv[1])
+    reference = arguments.pop("reference")
     events = os.dup(1)
-    # Drivers print.
+    # Drivers print to stdout. Events have a file descriptor of their own, so that such text cannot corrupt them.
     os.dup2(2, 1)
-    maker = Maker(backend, None if device == "-" else int(device))  # type: ignore[arg-type]
-    worker = Worker(maker, events)
+    worker = Worker(events)
     signal.signal(signal.SIGTERM, worker.stop)
-    if worker.open("reference" in rest):
+    if worker.open(reference, arguments):
         worker.work()
-    # All is written. Taking interpreter and driver apart would take 0.1 s, which the parent waits for.
+    # All files are written. Skip the shutdown of interpreter and driver, for which the parent would wait 0.1 s.
     sys.stderr.flush()
     os._exit(0)
 

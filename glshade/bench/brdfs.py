@@ -1,8 +1,8 @@
-"""What a reflectance model costs: a pixel, a vertex, and in operations.
+"""Costs of the reflectance models: measures the time of an evaluation at a pixel and at a vertex, its operations, and its GLSL.
 
-A model is evaluated many times a pixel along directions that change from pixel to pixel and from round to round
-(shaders/lib/evaluations.glsl), in a program with the model's generated text and its parameters as uniforms. The same program
-without a model is taken off: what remains is the model.
+A program with the model's generated GLSL evaluates the model many times at each pixel, along directions that change from pixel
+to pixel and from round to round (shaders/driver/evaluations.glsl). The time of the same program without a model is subtracted,
+so that the time of the model remains.
 """
 
 from __future__ import annotations
@@ -19,17 +19,28 @@ from glshade.driver.census import Operations, censuses
 from glshade.driver.clock import Spread, on_cpu
 from glshade.driver.workload import Workload
 from glshade.gl.context import Backend, open_context
-from glshade.glsl.generator import Source, Stage, expand
+from glshade.glsl.generator import model_code
+from glshade.glsl.shaders import Shaders, current, expand
+from glshade.glsl.source import Code, Source, Stage
+from glshade.scene.models import Folders, paths
 
+# Default number of measurements of each model.
 REPEAT = 7
-# The model of the program that is taken off. Adding a model's value to those before it is the model's.
-NOTHING = {"model": "vec3 value(Frame f, vec3 l, vec3 v) {\n    return vec3(0.0);\n}\n"}
+# The GLSL that takes the place of the model in the program without a model, whose time is subtracted.
+NOTHING = {"model": Code().add("vec3 value(Frame f, vec3 l, vec3 v) {\n    return vec3(0.0);\n}\n")}
 
 
 @dataclass(frozen=True)
 class Cost:
-    """What one material costs. pixel, vertex: an evaluation there [ns]; operations: None where the driver shows none;
-    size: bytes of GLSL without comments and blank lines, includes and uniforms counted."""
+    """The cost of one material.
+
+    model: name of the model
+    variant: options that differ from the defaults; "" for the defaults
+    pixel: time of an evaluation in the fragment stage [ns]
+    vertex: time of an evaluation in the vertex stage [ns]
+    operations: operations of one evaluation; None if the driver does not print them
+    size: length of the material's GLSL with includes and uniforms, without comments and blank lines [bytes]
+    """
 
     model: str
     variant: str
@@ -39,7 +50,7 @@ class Cost:
     size: int
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Returns the cost as JSON types."""
         return {
             "model": self.model,
             "variant": self.variant,
@@ -52,8 +63,16 @@ class Cost:
 
 @dataclass(frozen=True)
 class Costs:
-    """Costs, and on what they were measured. threads: those that the machine offers; clock: what the times are of, "core" (one
-    core's, where the CPU draws) or "wall"; rounds: evaluations a pixel and a vertex; repeat: measurements of each."""
+    """The costs of several materials, and the conditions of the measurement.
+
+    renderer: GL_RENDERER, the driver's name of the renderer
+    version: GL_VERSION, the driver's version of OpenGL
+    threads: number of cores that the process may use
+    clock: "core" if the times are those of one core, because the CPU draws; "wall" if they are wall-clock times
+    rounds: number of evaluations at each "pixel" and each "vertex"
+    repeat: number of measurements of each material
+    rows: the costs
+    """
 
     renderer: str
     version: str
@@ -64,80 +83,103 @@ class Costs:
     rows: tuple[Cost, ...]
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Returns the costs as JSON types."""
         return {**vars(self), "rows": [row.as_dict() for row in self.rows]}
 
 
 def variants(model: Any) -> dict[str, Brdf]:
-    """What to measure of a model, name -> material: "" is its defaults; then each other combination of its options, and the
-    anisotropic material of a model whose default is isotropic."""
+    """Returns the materials of a model to measure: variant -> material.
+
+    The variant "" has the defaults. Each other combination of the model's options is a variant, and so is "anisotropic" for a
+    model that is isotropic by default.
+    """
     plain = model()
-    found = {"": plain}
+    materials = {"": plain}
     options = [get_args(model.model_fields[name].annotation) for name in model.choices()]
     for values in itertools.product(*options):
         chosen = dict(zip(model.choices(), values, strict=True))
         changed = {name: value for name, value in chosen.items() if value != getattr(plain, name)}
         if changed:
-            found[", ".join(f"{name} {value}" for name, value in changed.items())] = model(**chosen)
+            materials[", ".join(f"{name} {value}" for name, value in changed.items())] = model(**chosen)
     uneven = {name: 0.5 for name, value in model.isotropic_where.items() if isinstance(value, float | int)}
     if uneven and not plain.needs_tangents:
-        found["anisotropic"] = model(**uneven)
-    return found
+        materials["anisotropic"] = model(**uneven)
+    return materials
 
 
-def source(brdf: Brdf | None, stage: str) -> Source:
-    """The program that evaluates a material in that stage, "fragment" or "vertex"; None: nothing in its place."""
+def source(brdf: Brdf | None, stage: str, shaders: Shaders | None = None) -> Source:
+    """Returns the program that evaluates a material many times in a stage.
+
+    brdf: the material; None returns the program without a model
+    stage: "fragment" or "vertex"
+    shaders: shader files; None takes glshade's own
+    """
     text = NOTHING if brdf is None else _text(brdf)
     if stage == "vertex":
-        return Source(expand("pass/cost.vert", text), None)
-    return Source(expand("pass/picture.vert", {}), expand("pass/cost.frag", text))
+        return Source(expand("pass/cost.vert", text, shaders), None)
+    return Source(expand("pass/picture.vert", {}, shaders), expand("pass/cost.frag", text, shaders))
 
 
-def _text(brdf: Brdf) -> dict[str, str]:
-    """The model's include, its uniforms, and `value(f, l, v)`: the frame is another at each pixel."""
-    names = list(brdf.parameters())
-    text = f'#include "brdf/{brdf.brdf}.glsl"\n'
-    text += "".join(f"uniform {'vec3' if brdf.is_colour(name) else 'float'} u_{name};\n" for name in names)
-    struct = f"{BRDFS.class_name(brdf.brdf)}({', '.join(f'u_{name}' for name in names)})"
-    text += f"\nvec3 value(Frame f, vec3 l, vec3 v) {{\n    return brdf_cos({struct}, f, l, v);\n}}\n"
-    return {**brdf.slots(), "model": text}
+def _text(brdf: Brdf) -> dict[str, Code]:
+    """Returns the GLSL code of `value(f, l, v)`, which evaluates the material in a frame f that differs from pixel to pixel."""
+    return model_code(brdf, "vec3 value(Frame f, vec3 l, vec3 v)", "f")
 
 
-def size(brdf: Brdf) -> int:
-    """Bytes of a material's GLSL: what its program has beyond one without a model; comments and blank lines are not counted."""
+def size(brdf: Brdf, shaders: Shaders | None = None) -> int:
+    """Returns the length of a material's GLSL, without comments and blank lines [bytes].
+
+    This is the length of its program minus that of the program without a model.
+    """
 
     def bare(stage: Stage | None) -> int:
         assert stage is not None
         lines = (re.sub(r"//.*", "", line).rstrip() for line in stage.text.splitlines())
         return sum(len(line) + 1 for line in lines if line)
 
-    return bare(source(brdf, "fragment").fragment) - bare(source(None, "fragment").fragment)
+    return bare(source(brdf, "fragment", shaders).fragment) - bare(source(None, "fragment", shaders).fragment)
 
 
-def operations(brdfs: Sequence[Brdf], backend: Backend = "auto", device: int | None = None) -> list[Operations | None]:
-    """What one evaluation of each asks for; None where the driver does not show it. Errors: as of `censuses`."""
-    found = [one and one.fragment for one in censuses([source(brdf, "fragment") for brdf in (None, *brdfs)], backend, device)]
-    nothing = found[0]
-    return [one - nothing if one and nothing else None for one in found[1:]]
+def operations(
+    brdfs: Sequence[Brdf], backend: Backend = "auto", device: int | None = None, shaders: Shaders | None = None
+) -> list[Operations | None]:
+    """Returns the operations of one evaluation of each material; None if the driver does not print them.
+
+    Errors: as for `censuses`.
+    """
+    sources = [source(brdf, "fragment", shaders) for brdf in (None, *brdfs)]
+    nothing, *counts = [census and census.fragment for census in censuses(sources, backend, device)]
+    return [count - nothing if count and nothing else None for count in counts]
 
 
 def costs(
-    names: Sequence[str] | None = None, repeat: int = REPEAT, backend: Backend = "auto", device: int | None = None
+    names: Sequence[str] | None = None,
+    repeat: int = REPEAT,
+    backend: Backend = "auto",
+    device: int | None = None,
+    shaders: Folders | None = None,
 ) -> Costs:
-    """The cost of the models called `names`, all of them by default, in each of their variants.
+    """Measures the cost of models in each of their variants.
 
-    repeat: measurements of each, whose median and range are told. Errors: KeyError for a model that there is not,
-    ContextError, ShaderError.
+    names: names of the models; None or empty measures all
+    repeat: number of measurements of each material, whose median and range are reported
+    backend: OpenGL backend, as for Renderer
+    device: EGL device; None leaves the choice to the driver
+    shaders: the user's own shader folders
+    Errors: KeyError for an unknown model; ContextError; ShaderError.
     """
-    materials = [(name, said, brdf) for name in names or BRDFS for said, brdf in variants(BRDFS[name]).items()]
-    counted = operations([brdf for _, _, brdf in materials], backend, device)
+    materials = [(name, variant, brdf) for name in names or BRDFS for variant, brdf in variants(BRDFS[name]).items()]
+    files = current(paths(shaders))
+    counted = operations([brdf for _, _, brdf in materials], backend, device, files)
     context = open_context(backend, device)
     try:
-        benches = {stage: Workload(context, stage, source(None, stage)) for stage in ("fragment", "vertex")}
+        benches = {stage: Workload(context, stage, source(None, stage, files)) for stage in ("fragment", "vertex")}
         rows = []
-        for (name, said, brdf), asked in zip(materials, counted, strict=True):
-            took = {stage: bench.nanoseconds(source(brdf, stage), numbers(brdf), repeat) for stage, bench in benches.items()}
-            rows.append(Cost(name, said, took["fragment"], took["vertex"], asked, size(brdf)))
+        for (name, variant, brdf), count in zip(materials, counted, strict=True):
+            pixel, vertex = (
+                benches[stage].nanoseconds(source(brdf, stage, files), numbers(brdf), repeat)
+                for stage in ("fragment", "vertex")
+            )
+            rows.append(Cost(name, variant, pixel, vertex, count, size(brdf, files)))
         return Costs(
             renderer=context.renderer,
             version=context.version,
@@ -152,18 +194,21 @@ def costs(
 
 
 def _threads() -> int:
-    """Those that a software driver may use."""
+    """Returns the number of cores that this process may use. A software driver runs one thread on each of them."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def table(found: Costs) -> list[tuple[str, ...]]:
-    """Rows of text for people, the first the heading: model, ns a pixel and a vertex with their ranges, operations, bytes."""
+def table(measured: Costs) -> list[tuple[str, ...]]:
+    """Returns rows of text; the first row holds the headings.
+
+    The columns are the model, the times at a pixel and at a vertex [ns] with their ranges, the operations and the bytes.
+    """
 
     def ns(spread: Spread) -> tuple[str, str]:
         return f"{spread.median:6.2f}", f"{spread.low:.2f} to {spread.high:.2f}"
 
     rows: list[tuple[str, ...]] = [("model", " pixel", "range", "vertex", "range", " ops", "of these", "bytes")]
-    for row in found.rows:
+    for row in measured.rows:
         name = f"{row.model} ({row.variant})" if row.variant else row.model
         counted = ("   -", "-") if row.operations is None else (f"{row.operations.total:4}", str(row.operations))
         rows.append((name, *ns(row.pixel), *ns(row.vertex), *counted, f"{row.size:5}"))

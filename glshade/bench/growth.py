@@ -1,4 +1,4 @@
-"""Growth: how the time of a frame grows with what is in it, as an exponent: 1 is in proportion, 2 its square."""
+"""Growth: measures how the time of a frame grows with the contents of its scene, as the exponent of a power law."""
 
 from __future__ import annotations
 
@@ -19,22 +19,23 @@ from glshade.gl.renderer import Renderer
 from glshade.mesh.primitives import icosphere
 from glshade.scene.scene import Scene
 
-# The most that an exponent may be: twice as much takes at most 2.2 times as long.
+# Largest exponent that counts as near linear: with it, twice as many contents take 2.2 times as long.
 NEAR_LINEAR = 1.15
-# The most that an object may add to a frame [s].
+# Largest time that one more object may add to a frame [s].
 AN_OBJECT = 30e-6
+# Default width and height of the pictures [pixels].
 SIDE = 512
 MATERIAL = {"brdf": "phong", "kd": list(KD), "ks": KS, "exponent": EXPONENT}
 SUN = {"type": "directional", "direction": [-x for x in TO_LIGHT]}
 
 
 def triangles(subdivisions: int) -> tuple[int, Scene]:
-    """One sphere."""
+    """Returns the number of triangles, and a scene with one sphere."""
     return 20 * 4**subdivisions, _scene([_sphere(subdivisions)])
 
 
 def lights(count: int) -> tuple[int, Scene]:
-    """Point lights on a circle before the sphere, together as bright as one."""
+    """Returns the number of lights, and a scene with point lights on a circle before a sphere. Intensities add up to 1."""
     turns = 2 * np.pi * np.arange(count) / count
     places = np.stack([3 * np.cos(turns), 3 * np.sin(turns), np.full(count, 2.0)], axis=1)
     lamps = [{"type": "point", "position": p, "intensity": 1 / count, "falloff": "none"} for p in places.tolist()]
@@ -42,19 +43,20 @@ def lights(count: int) -> tuple[int, Scene]:
 
 
 def pixels(side: int) -> tuple[int, Scene]:
-    """The same view, finer."""
+    """Returns the number of pixels, and a scene with one sphere in a picture of this width and height [pixels]."""
     return side**2, _scene([_sphere(5)], side=side)
 
 
 def objects(count: int) -> tuple[int, Scene]:
-    """Small spheres of one mesh and one material in a square before the camera."""
+    """Returns the number of objects, and a scene with small spheres in a square, which share one mesh and one material."""
     across = int(np.ceil(np.sqrt(count)))
     places = (np.stack(np.unravel_index(np.arange(count), (across, across)), axis=1) + 0.5) / across * 2 - 1
     radius = 0.8 / across
     return count, _scene([{**_sphere(1), "transform": {"translate": [*p, 0], "scale": radius}} for p in places.tolist()])
 
 
-# What grows: how to make a scene, and of what sizes. Fewer than the scenes that a renderer keeps ready.
+# Name of a series -> (function that makes a scene, its argument for each scene). A series has fewer scenes than a renderer's
+# cache holds.
 SERIES: Mapping[str, tuple[Callable[[int], tuple[int, Scene]], tuple[int, ...]]] = {
     "triangles": (triangles, (3, 4, 5, 6, 7, 8)),
     "lights": (lights, (1, 2, 4, 8, 16, 32, 64)),
@@ -65,7 +67,12 @@ SERIES: Mapping[str, tuple[Callable[[int], tuple[int, Scene]], tuple[int, ...]]]
 
 @dataclass(frozen=True)
 class Growth:
-    """A series. sizes: ascending; seconds: of a frame at each, read back."""
+    """The measurements of one series.
+
+    what: name of the series, as in SERIES
+    sizes: number of triangles, lights, pixels or objects of each scene, ascending
+    seconds: time of a frame of each scene, with its readback [s]
+    """
 
     what: str
     sizes: tuple[int, ...]
@@ -73,27 +80,27 @@ class Growth:
 
     @property
     def exponent(self) -> float:
-        """Of the power law nearest to all of them."""
+        """The exponent of the power law fitted to all sizes."""
         return fitted(self.sizes, [spread.median for spread in self.seconds])
 
     @property
     def at_the_end(self) -> float:
-        """From the last but one to the last, where what every frame costs weighs least."""
+        """The exponent between the last two sizes, where the fixed cost of a frame matters least."""
         return fitted(self.sizes[-2:], [spread.median for spread in self.seconds[-2:]])
 
     @property
     def each(self) -> float:
-        """What one more costs, between the ends [s]."""
+        """The time that one more triangle, light, pixel or object adds, between the first and the last size [s]."""
         return (self.seconds[-1].median - self.seconds[0].median) / (self.sizes[-1] - self.sizes[0])
 
     @property
     def met(self) -> bool:
-        """Near linear, or less; of objects also cheap enough each."""
+        """Whether the targets are met: both exponents are at most NEAR_LINEAR, and one more object takes at most AN_OBJECT."""
         cheap = self.what != "objects" or self.each <= AN_OBJECT
         return cheap and max(self.exponent, self.at_the_end) <= NEAR_LINEAR
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Returns the measurements as JSON types."""
         rows = [{"size": size, "seconds": spread.as_dict()} for size, spread in zip(self.sizes, self.seconds, strict=True)]
         figures = {"exponent": self.exponent, "exponent_at_the_end": self.at_the_end, "seconds_each": self.each}
         rounded = {name: float(f"{value:.4g}") for name, value in figures.items()}
@@ -102,33 +109,36 @@ class Growth:
 
 
 def fitted(sizes: Sequence[float], seconds: Sequence[float]) -> float:
-    """The exponent p of the c n^p that is nearest, by least squares of the logarithms."""
+    """Returns the exponent p of the power law c n^p for the time at the size n, fitted by least squares of the logarithms."""
     return float(np.polyfit(np.log(sizes), np.log(seconds), 1)[0])
 
 
-def growth(what: str, repeat: int, small: bool = False) -> Growth:
-    """Measures a series by the clock on the wall, its sizes in turn; small: the first three of them, in few pixels.
+def measure_growth(what: str, repeat: int, small: bool = False) -> Growth:
+    """Measures the scenes of a series in turn, in wall-clock time.
 
-    Errors: KeyError, ContextError.
+    what: name of the series, as in SERIES
+    repeat: number of rounds that are counted
+    small: True measures only the first three scenes, to see that it works
+    Errors: KeyError for an unknown series; ContextError.
     """
     make, steps = SERIES[what]
-    made = [make(step) for step in (islice(steps, 3) if small else steps)]
-    took: list[list[float]] = [[] for _ in made]
+    scenes = [make(step) for step in (islice(steps, 3) if small else steps)]
+    times: list[list[float]] = [[] for _ in scenes]
     with Renderer() as renderer:
-        # The first round compiles and uploads.
+        # The first round is not counted, because the renderer compiles programs and uploads meshes in it.
         for turn in range(repeat + 1):
-            for (_, scene), found in zip(made, took, strict=True):
+            for (_, scene), rounds in zip(scenes, times, strict=True):
                 seconds = median(draws(partial(renderer.render, scene), FRAMES))
                 if turn:
-                    found.append(seconds)
-    return Growth(what, tuple(size for size, _ in made), tuple(map(Spread.of, took)))
+                    rounds.append(seconds)
+    return Growth(what, tuple(size for size, _ in scenes), tuple(map(Spread.of, times)))
 
 
 def _sphere(subdivisions: int) -> dict[str, Any]:
     return {"mesh": _icosphere(subdivisions), "material": MATERIAL}
 
 
-# One mesh, not thousands of equal ones.
+# Cached, so that thousands of objects share one mesh.
 _icosphere = cache(icosphere)
 
 

@@ -1,4 +1,4 @@
-"""Report: everything that a run has measured, on what, as JSON and as tables."""
+"""Report: writes the results of `glshade bench`, and the machine they were measured on, as JSON and as tables."""
 
 from __future__ import annotations
 
@@ -11,31 +11,39 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from glshade.bench.contest import Row
+from glshade.bench.contest import ContestRow
 from glshade.bench.growth import AN_OBJECT, NEAR_LINEAR, Growth
 from glshade.bench.jobs import TARGET, Jobs
 from glshade.bench.works import GLSHADE, WORKS
 from glshade.driver.clock import Spread
 from glshade.version import __version__
 
-# Raised where a key changes its meaning or goes; keys may be added.
+# Version of the JSON object. It is raised if a key changes its meaning or is removed; added keys do not raise it.
 SCHEMA = 1
 
+# (title, rows of text). The first row holds the headings.
 Table = tuple[str, list[tuple[str, ...]]]
 
 
 @dataclass
-class Report:
-    """A run. small: only to see that it works; contests: work -> rows."""
+class BenchReport:
+    """The results of one run.
+
+    repeat: number of rounds that were counted
+    small: True if the works were reduced, to see that they work
+    contests: name of a work -> results of the programs
+    growths: the series that were measured
+    jobs: the frame rates for each number of jobs; None if they were not measured
+    """
 
     repeat: int
     small: bool
-    contests: dict[str, list[Row]] = field(default_factory=dict)
+    contests: dict[str, list[ContestRow]] = field(default_factory=dict)
     growths: list[Growth] = field(default_factory=list)
     jobs: Jobs | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Returns the report as JSON types."""
         works = {
             name: {"what": WORKS[name].what, "limit_seconds": WORKS[name].limit, "rows": [row.as_dict() for row in rows]}
             for name, rows in self.contests.items()
@@ -53,7 +61,7 @@ class Report:
         }
 
     def tables(self) -> Iterator[Table]:
-        """Title and rows of text, the first the heading, of each thing measured."""
+        """Yields a table for each work that was measured, and one each for growth and jobs if these were measured."""
         for name, rows in self.contests.items():
             yield f"{name}: {WORKS[name].what}", list(_contest(name, rows))
         if self.growths:
@@ -62,21 +70,24 @@ class Report:
             yield f"jobs: {WORKS['W4'].what}", list(_jobs(self.jobs))
 
     def heading(self) -> list[str]:
-        """On what, and how, in a few lines."""
-        on = machine()
+        """Returns lines that describe the machine, the versions, the drivers and the rounds."""
+        host = machine()
         named = ", ".join(f"{name} {number}" for name, number in versions([r.program for r in self._rows()]).items())
         drivers = dict.fromkeys(row.driver for row in self._rows() if row.driver)
-        lines = [f"{on['cpu']}, {on['threads']} threads; {on['system']}; Python {on['python']}", named]
-        lines += [f"drivers: {'; '.join(drivers)}"] if drivers else []
-        lines += [f"median, and least to most, of {self.repeat} rounds in turn; ratio: glshade's time over the program's"]
-        return [*lines, *(["small: these times say nothing"] if self.small else [])]
+        lines = [f"{host['cpu']}, {host['threads']} threads; {host['system']}; Python {host['python']}", named]
+        if drivers:
+            lines.append(f"drivers: {'; '.join(drivers)}")
+        lines.append(f"median, and least to most, of {self.repeat} rounds in turn; ratio: glshade's time over the program's")
+        if self.small:
+            lines.append("small: the works are reduced, so the times are not comparable")
+        return lines
 
-    def _rows(self) -> list[Row]:
+    def _rows(self) -> list[ContestRow]:
         return [row for rows in self.contests.values() for row in rows]
 
 
 def machine() -> dict[str, Any]:
-    """What it was measured on."""
+    """Returns the name of the CPU, the number of cores that this process may use, the system and the version of Python."""
     threads = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return {"cpu": _cpu(), "threads": threads, "system": platform.platform(terse=True), "python": platform.python_version()}
 
@@ -91,18 +102,18 @@ def _cpu() -> str:
 
 
 def versions(programs: Sequence[str]) -> dict[str, str]:
-    """Program -> version of its library, glshade's among them."""
-    found = {GLSHADE: __version__}
+    """Returns the version of glshade and of each program's library: name -> version, "?" if unknown."""
+    numbers = {GLSHADE: __version__}
     for name in programs:
         try:
-            found.setdefault(name, version(name))
+            numbers.setdefault(name, version(name))
         except PackageNotFoundError:
-            found[name] = "?"
-    return found
+            numbers[name] = "?"
+    return numbers
 
 
-def markdown(report: Report) -> str:
-    """The tables as GitHub's Markdown."""
+def markdown(report: BenchReport) -> str:
+    """Returns the heading and the tables as GitHub's Markdown."""
     parts = ["\n".join(f"- {line}" for line in report.heading())]
     for title, (heads, *rows) in report.tables():
         lines = [heads, ("---",) * len(heads), *rows]
@@ -110,24 +121,24 @@ def markdown(report: Report) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _contest(name: str, rows: Sequence[Row]) -> Iterator[tuple[str, ...]]:
-    """Milliseconds, or seconds where files are written."""
+def _contest(name: str, rows: Sequence[ContestRow]) -> Iterator[tuple[str, ...]]:
+    """Yields the rows of a work's table. Times are in seconds if the work is of the kind "files", otherwise in milliseconds."""
     unit, scale = ("s", 1.0) if WORKS[name].kind == "files" else ("ms", 1e3)
     commands = any(row.whole for row in rows)
-    heads = ("program", unit, "range", "ratio", "range", "target", "picture")
-    yield heads[:3] + ("whole command",) * commands + heads[3:]
+    whole_heads = ("whole command",) if commands else ()
+    yield ("program", unit, "range", *whole_heads, "ratio", "range", "target", "picture")
     for row in rows:
         label = f"{row.program} by hand" if row.program == "moderngl" else row.program
         if row.fault is not None:
-            yield (label, *["-"] * (5 + commands), row.fault)
+            yield (label, *["-"] * (6 if commands else 5), row.fault)
             continue
-        whole = (_figures(row.whole, 1.0)[0] + " s",) if row.whole else ("-",)
+        whole = _figures(row.whole, 1.0)[0] + " s" if row.whole else "-"
         limit = WORKS[name].limit
         if row.program == GLSHADE and limit is not None and row.whole is not None:
-            whole = (f"{whole[0]} (<= {limit:g} s: {_word(row.whole.median <= limit)})",)
+            whole += f" (<= {limit:g} s: {_word(row.whole.median <= limit)})"
         aim = "" if row.target is None else f"<= {row.target:.2f}: {_word(row.met)}"
         picture = "" if row.program == GLSHADE else "the same" if row.same else f"another ({row.codes} codes)"
-        yield (label, *_figures(row.seconds, scale), *(whole if commands else ()), *_figures(row.ratio, 1.0), aim, picture)
+        yield (label, *_figures(row.seconds, scale), *((whole,) if commands else ()), *_figures(row.ratio, 1.0), aim, picture)
 
 
 def _growths(growths: Sequence[Growth]) -> Iterator[tuple[str, ...]]:
@@ -149,6 +160,7 @@ def _jobs(jobs: Jobs) -> Iterator[tuple[str, ...]]:
 
 
 def _figures(spread: Spread | None, scale: float) -> tuple[str, str]:
+    """Returns (median, range) of a measurement times `scale`, as text. Both texts are empty if there is no measurement."""
     if spread is None:
         return "", ""
     median, low, high = (_short(x * scale) for x in (spread.median, spread.low, spread.high))
@@ -156,7 +168,7 @@ def _figures(spread: Spread | None, scale: float) -> tuple[str, str]:
 
 
 def _short(x: float) -> str:
-    """Three digits, or what is before the point."""
+    """Returns a number with three significant digits, or without decimals from 100 on."""
     return f"{x:.0f}" if x >= 100 else f"{x:.1f}" if x >= 10 else f"{x:.2f}"
 
 

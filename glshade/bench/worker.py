@@ -1,10 +1,11 @@
-"""A program in a process of its own, so that drivers and their state do not mix.
+"""Worker: runs one program in a process of its own, so that the programs' drivers do not influence each other.
 
-    python -m glshade.bench.worker NAME serve STAGE           draws when told to, by lines on stdin (`Worker` speaks them)
-    python -m glshade.bench.worker NAME files STAGE FOLDER    writes the frames 0001.png ..., and says what that took [s]
-    python -m glshade.bench.worker NAME cold STAGE PICTURE    writes one picture, and that is all
+    python -m glshade.bench.worker NAME serve STAGE           draws on request, by lines on stdin (see `serve`)
+    python -m glshade.bench.worker NAME files STAGE FOLDER    writes the frames 0001.png ..., and reports the time [s]
+    python -m glshade.bench.worker NAME cold STAGE PICTURE    writes one picture
 
-The programs time themselves: what the pipe costs is nobody's. Nothing is imported here that a cold start would pay for.
+The programs measure their own time, so that the time for the pipe is not included. This module imports little at its start,
+because the time of `cold` includes its imports.
 """
 
 from __future__ import annotations
@@ -18,21 +19,24 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from glshade.bench.stage import EYE, Stage, eye
+from glshade.bench.stage import EYE, WorkFiles, eye
 from glshade.bench.works import GLSHADE
 
-# [s]
+# Smallest total time of the frames of one measurement [s].
 LEAST = 0.3
 
 
-def program(name: str, stage: Stage) -> Any:
-    """The program, ready to draw."""
+def program(name: str, stage: WorkFiles) -> Any:
+    """Returns the program, ready to draw a stage."""
     module = "glshade.bench.own" if name == GLSHADE else f"glshade.bench.peers.{name}"
     return importlib.import_module(module).Peer(stage)
 
 
 def files(drawer: Any, count: int, folder: str) -> float:
-    """Writes the frames; seconds from the start of the first to the end of the last, after one that is not written."""
+    """Writes frames to a folder, and returns the time from the start of the first frame to the end of the last [s].
+
+    Another frame is drawn before the first one and not written, so that the program's preparations are not counted.
+    """
     drawer.frame(EYE)
     start = perf_counter()
     for frame in range(1, count + 1):
@@ -41,49 +45,56 @@ def files(drawer: Any, count: int, folder: str) -> float:
 
 
 def draws(draw: Callable[[], Any], count: int) -> list[float]:
-    """Seconds of each frame, after one that is not counted: others have used the caches in the meantime.
+    """Draws frames repeatedly, and returns the time of each [s].
 
-    count: at least; short frames are drawn until it is LEAST, so that one hiccup of the machine is not the median.
+    The first frame is not counted, because other programs have used the CPU's caches since this program's last round. At least
+    `count` frames are counted, and as many as it takes for all frames together to last LEAST. So a short load of the machine
+    does not change the median.
     """
-    found: list[float] = []
-    while len(found) <= count or sum(found) < LEAST:
+    times: list[float] = []
+    while len(times) <= count or sum(times) < LEAST:
         start = perf_counter()
         draw()
-        found.append(perf_counter() - start)
-    return found[1:]
+        times.append(perf_counter() - start)
+    return times[1:]
 
 
 def serve(drawer: Any, answer: Any) -> None:
-    """Answers each line of stdin by a line: a number of frames by their seconds, a path by writing the picture there (.npy)."""
+    """Answers each line of stdin, one JSON value a line.
+
+    A number asks for that many frames; the answer is the time of each [s]. A string is the path of an .npy file, to which the
+    picture is written; the answer is the path.
+    """
     import numpy as np
 
     answer({"driver": drawer.driver})
     for line in sys.stdin:
-        asked = json.loads(line)
-        if isinstance(asked, str):
-            np.save(asked, drawer.frame(EYE))
-            answer(asked)
+        request = json.loads(line)
+        if isinstance(request, str):
+            np.save(request, drawer.frame(EYE))
+            answer(request)
         else:
-            answer(draws(lambda: drawer.frame(EYE), asked))
+            answer(draws(lambda: drawer.frame(EYE), request))
 
 
-def main(name: str, verb: str, stage_path: str, *where: str) -> None:
-    # Drivers and libraries print: stdout is for the answers alone.
+def main(name: str, verb: str, stage_path: str, *targets: str) -> None:
+    """Runs a program; the module's docstring lists the arguments."""
+    # Drivers and libraries print to stdout. Answers have a file descriptor of their own, so that such text cannot corrupt them.
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
 
-    def answer(said: Any) -> None:
-        print(json.dumps(said), file=out, flush=True)
+    def answer(value: Any) -> None:
+        print(json.dumps(value), file=out, flush=True)
 
-    stage = Stage.load(stage_path)
+    stage = WorkFiles.load(stage_path)
     drawer = program(name, stage)
     if verb == "serve":
         serve(drawer, answer)
     elif verb == "files":
-        Path(where[0]).mkdir(parents=True, exist_ok=True)
-        answer({"driver": drawer.driver, "seconds_pictures": files(drawer, stage.frames, where[0])})
+        Path(targets[0]).mkdir(parents=True, exist_ok=True)
+        answer({"driver": drawer.driver, "seconds_pictures": files(drawer, stage.frames, targets[0])})
     else:
-        drawer.save(EYE, where[0])
+        drawer.save(EYE, targets[0])
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Works: what is measured, as the figures of docs/benchmarks.md name it, and how fast glshade is to be."""
+"""Works: lists the pieces of work by which docs/benchmarks.md compares programs, and the targets for glshade."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-# Who draws: glshade itself, the program written by hand with nothing but moderngl, and in targets the fastest but glshade.
+# Names of programs: glshade itself, and the peer that is written by hand with moderngl alone. As a key of targets, FASTEST
+# stands for the fastest peer.
 GLSHADE, BY_HAND, FASTEST = "glshade", "moderngl", "fastest"
 
 
@@ -14,10 +15,17 @@ GLSHADE, BY_HAND, FASTEST = "glshade", "moderngl", "fastest"
 class Work:
     """One piece of work that every program does.
 
-    kind: "frame", one picture in memory, drawn again and again; "files", `frames` PNG files; "cold", a new process that ends
-    with one. subdivisions: of the icosahedron, 20 * 4^n triangles; side: of the picture [pixels]; scattered: shuffled
-    triangles and vertices. targets: program -> the most that glshade may take, as a share of that program's time; "peers":
-    every one whose picture is the same. limit: the most that the whole command of glshade may take [s].
+    what: description for the table's title
+    kind: "frame" draws one picture in memory repeatedly; "files" writes `frames` PNG files; "cold" writes one PNG file in a new
+        process
+    subdivisions: number n of subdivisions of the icosahedron; the sphere has 20 * 4^n triangles
+    side: width and height of the picture [pixels]
+    lights: "directional" for one directional light, "points" for eight point lights
+    scattered: True shuffles triangles and vertices
+    frames: number of frames
+    targets: program -> largest time of glshade, as a fraction of that program's time; the key "peers" stands for every program
+        that draws the same picture
+    limit: largest time of glshade's whole command [s]; None if there is no limit
     """
 
     what: str
@@ -31,11 +39,11 @@ class Work:
     limit: float | None = None
 
     def small(self) -> Work:
-        """The same in a moment, to see that it works; its times say nothing."""
+        """Returns a reduced work that takes only a moment, for a quick test. Its times are not comparable."""
         return replace(self, subdivisions=min(self.subdivisions, 3), side=64, frames=min(self.frames, 3))
 
 
-# "Four times as fast" is a quarter of the time.
+# A target is the ratio of glshade's time to the other program's time: 1 / 4 means "four times as fast".
 WORKS = {
     "W1": Work("20k triangles, 1 directional light, 1024x1024 pixels to NumPy", targets={BY_HAND: 0.85, "peers": 1.0}),
     "W2": Work("the same under 8 point lights", lights="points", targets={BY_HAND: 0.95}),

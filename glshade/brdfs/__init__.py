@@ -1,7 +1,8 @@
-"""The reflectance models: one module each, found by its presence, beside one GLSL file of the same name.
+"""The reflectance models. Each is a module of this package, found by its presence, and a GLSL file of the same name.
 
-A model's class is its entry in the scene file: parameters with default, range, unit and meaning. `brdf_cos` is its value in
-float64: f cos = BRDF times max(n.l, 0) [1/sr], 0 where n.l <= 0 or n.v <= 0.
+A model's class describes its table in the scene file: each parameter with default, range, unit and meaning. Its `brdf_cos`
+computes f cos in float64: the BRDF f times max(n.l, 0) [1/sr], and 0 where n.l <= 0 or n.v <= 0. n is the normal, l the
+direction to the light, and v the direction to the viewer. The shape (...) stands for any leading shape.
 """
 
 from collections.abc import Iterable, Mapping
@@ -29,19 +30,25 @@ def _branch(value: Any) -> str:
     return "<texture-table>" if isinstance(value, Mapping | Picture) else "<value>"
 
 
-# What a parameter may be: three numbers (one stands for three) or one number, or a texture.
+# The types of parameters. A colour is three numbers (one number stands for three equal ones) or a texture; a scalar is one
+# number or a texture.
 Colour = Annotated[Annotated[Triple, Tag("<value>")] | Annotated[Texture, Tag("<texture-table>")], Discriminator(_branch)]
 Scalar = Annotated[Annotated[Finite, Tag("<value>")] | Annotated[Texture, Tag("<texture-table>")], Discriminator(_branch)]
-# An angle, or a picture of directions.
+# An angle, or a texture that holds a direction in each texel.
 Turn = Annotated[Annotated[Finite, Tag("<value>")] | Annotated[DirectionMap, Tag("<texture-table>")], Discriminator(_branch)]
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """What a model declares of one parameter.
+    """A model's declaration of one parameter.
 
-    `low`, `high` bound it; `usual` is the range worth a slider; `same_as` names the parameter it equals when left out;
-    `base` marks the surface's own colour, which vertex colours multiply and whose texture carries alpha.
+    description: its meaning, for the documentation.
+    low: the smallest value allowed.
+    high: the largest value allowed; None for no limit.
+    usual: the range that a slider would offer.
+    unit: the unit; "1" for a number without one.
+    same_as: the name of another parameter, whose value is the default.
+    base: whether it is the surface's own colour. Vertex colours multiply that one, and its texture holds alpha.
     """
 
     description: str
@@ -54,24 +61,43 @@ class Parameter:
 
 
 def parameter(default: Any, declared: Parameter) -> Any:
-    """A pydantic field that carries its declaration."""
+    """Returns a pydantic field for a parameter, with the declaration attached."""
     return Field(
         default, description=f"{declared.description} [{declared.unit}]", json_schema_extra={"glshade": vars(declared)}
     )
 
 
+@dataclass(frozen=True)
+class Slot:
+    """GLSL that takes the place of a name in angle brackets in a model's GLSL file.
+
+    includes: shader files, by their names below the shader folders.
+    text: GLSL that follows them.
+    """
+
+    includes: tuple[str, ...] = ()
+    text: str = ""
+
+
 def choice(default: str, description: str) -> Any:
-    """A pydantic field for an option that changes a program's text and is no number: a Literal of names."""
+    """Returns a pydantic field for an option: a Literal of names, one of which is chosen and changes the generated program."""
     return Field(default, description=description, json_schema_extra={"glshade_choice": True})
 
 
-# What a model promises unless it says otherwise: f(l, v) = f(v, l); no more light leaves than arrives.
+# Physical properties that every model has unless its `breaks` names them. Reciprocity: f(l, v) = f(v, l). Energy: no more light
+# leaves a surface than arrives.
 Law = Literal["reciprocity", "energy"]
 
 
 @dataclass(frozen=True)
 class Limit:
-    """Two materials that are the same function of directions, and how it is said. within: relative, in float64."""
+    """Two materials that have the same f cos for all directions.
+
+    says: the statement in words, for the documentation.
+    one: the first material.
+    other: the second material.
+    within: the relative difference allowed in float64.
+    """
 
     says: str
     one: "Brdf"
@@ -80,32 +106,37 @@ class Limit:
 
 
 class Brdf(Document):
-    """A material: a model's parameters, and what every material may say of its surface besides."""
+    """A material: the parameters of a model, and the keys that all materials share."""
 
     brdf: str
     alpha: Annotated[float, Field(ge=0, le=1)] = Field(1.0, description="opacity; the base texture's alpha multiplies it")
     alpha_mode: Literal["opaque", "mask", "blend"] = Field(
         "opaque",
-        description="opaque: alpha is ignored; mask: cut out below alpha_cutoff; blend: drawn back to front (approximate)",
+        description="opaque: alpha is ignored; mask: not drawn below alpha_cutoff; blend: drawn back to front (approximate)",
     )
-    alpha_cutoff: Annotated[float, Field(ge=0, le=1)] = Field(0.5, description="mask: what is less opaque is cut out")
+    alpha_cutoff: Annotated[float, Field(ge=0, le=1)] = Field(
+        0.5, description="mask: pixels with a smaller alpha are not drawn"
+    )
     normal_map: NormalMap | None = Field(None, description="tangent-space normals")
-    bump_map: BumpMap | None = Field(None, description="or heights, from which normals are made")
+    bump_map: BumpMap | None = Field(None, description="heights that normals are computed from; not together with normal_map")
     tangent_direction: Turn = Field(
-        0.0, description="anisotropic models: how far the tangent is turned, from u toward v [degrees]"
+        0.0, description="anisotropic models: the angle by which the tangent is turned from u toward v [degrees]"
     )
-    sides: Literal["auto", "front", "both"] = Field("auto", description="sides of the surface; an object may say otherwise")
+    sides: Literal["auto", "front", "both"] = Field("auto", description="the sides that are drawn; an object can override it")
 
-    # Paper, year and equations.
+    # The publication: authors, year and equations.
     source: ClassVar[str] = ""
-    # Laws that the model does not keep, and why.
+    # The properties that the model lacks by design, each with the reason.
     breaks: ClassVar[Mapping[Law, str]] = {}
-    # Reflectances that share one budget: the law of energy is promised where their sum is at most 1.
+    # The reflectances whose sum must be at most 1 to conserve energy. Empty where all values in range conserve energy.
     shares: ClassVar[tuple[str, ...]] = ()
-    # Of a model that looks at the tangent directions: what to set, to another parameter's value or a number, so that nothing
-    # hangs on them.
+    # How to make an anisotropic model isotropic: parameter -> a number, or the name of the parameter whose value it gets. Empty
+    # for a model that is always isotropic.
     isotropic_where: ClassVar[Mapping[str, str | float]] = {}
-    # Whether the model looks at the tangent directions.
+    # Four materials that show what the model can do, as parameters that differ from the defaults; docs/brdfs.md draws them from
+    # left to right. A model may leave this empty, and the page then varies its first parameter.
+    samples: ClassVar[tuple[Mapping[str, Any], ...]] = ()
+    # Whether the model's value can depend on the tangent directions.
     anisotropic: ClassVar[bool] = False
 
     @classmethod
@@ -114,13 +145,13 @@ class Brdf(Document):
 
     @classmethod
     def limits(cls) -> tuple[Limit, ...]:
-        """The simpler models that this one becomes."""
+        """Returns pairs of equal materials: at certain parameters this model equals a simpler one."""
         return ()
 
     @classmethod
     @cache
     def parameters(cls) -> dict[str, Parameter]:
-        """name -> declaration, in the order of the GLSL struct."""
+        """Returns the declarations of the parameters by name, in the order of the members of the GLSL struct."""
         found = {}
         for name, field in cls.model_fields.items():
             extra = field.json_schema_extra
@@ -131,58 +162,60 @@ class Brdf(Document):
     @classmethod
     @cache
     def choices(cls) -> tuple[str, ...]:
-        """The names of the options."""
+        """Returns the names of the options."""
         extras = {name: field.json_schema_extra for name, field in cls.model_fields.items()}
         return tuple(name for name, extra in extras.items() if isinstance(extra, dict) and "glshade_choice" in extra)
 
     def chosen(self) -> dict[str, str]:
-        """option -> choice."""
+        """Returns the name that is chosen for each option."""
         return {name: getattr(self, name) for name in self.choices()}
 
     def half_angle(self) -> "Brdf":
-        """The model with h in place of the mirror direction, where it has that: an approximation (lecture slide 20)."""
+        """Returns the half-angle variant of a model that uses the mirror direction: an approximation (lecture slide 20). Other
+        models return themselves."""
         return self
 
     def specular_part(self) -> "Brdf | None":
-        """The material whose f is this one's without its diffuse lobes; None where it has no others.
+        """Returns the same material without its diffuse lobes; None for a model that has only diffuse lobes.
 
-        What it reflects of ambient light counts as diffuse.
+        Ambient reflection counts as diffuse.
         """
         return None
 
     @classmethod
     @cache
     def base(cls) -> str | None:
-        """The parameter that is the surface's own colour."""
+        """Returns the name of the parameter that is the surface's own colour; None if the model has no such parameter."""
         return next((name for name, declared in cls.parameters().items() if declared.base), None)
 
     def without_base(self) -> "Brdf":
-        """The material with its own colour black: its specular part, where that colour is the diffuse lobe's alone."""
+        """Returns the material with a black base colour: its specular part, if only the diffuse lobe uses that colour."""
         name = self.base()
         if name is None:
             return self
         value, black = getattr(self, name), (0.0, 0.0, 0.0)
-        # What is cut out or let through stays so: a texture keeps its alpha.
+        # Where alpha matters, the texture stays for its alpha, and a factor of 0 makes its colours black.
         keeps = isinstance(value, Texture) and self.alpha_mode != "opaque"
         return self.model_copy(update={name: value.model_copy(update={"factor": black}) if keeps else black})
 
-    def slots(self) -> dict[str, str]:
-        """GLSL for the places that the model's file names in angle brackets. What this material does not need is not in it."""
+    def slots(self) -> dict[str, Slot]:
+        """Returns the GLSL for each name in angle brackets in the model's GLSL file. Parts that this material does not need are
+        left out."""
         return {}
 
     @property
     def needs_tangents(self) -> bool:
-        """Whether this material looks at the tangent directions."""
+        """Whether the value of this material depends on the tangent directions."""
         return self.anisotropic
 
     def asked(self, by: Literal["light", "ambient"]) -> frozenset[str]:
-        """The parameters that light from a direction, or ambient light, asks for."""
+        """Returns the parameters that the model reads for light from a direction, or for ambient light."""
         return self._traced(by, tuple(self.chosen().items()))
 
     @classmethod
     @cache
     def _traced(cls, by: Literal["light", "ambient"], chosen: tuple[tuple[str, str], ...]) -> frozenset[str]:
-        """Seen by running the model once."""
+        """Returns the parameters that the model reads, found by evaluating it once with a stand-in that records them."""
         asked = _Asked(cls, dict(chosen))
         up = np.array([[0.0, 0.0, 1.0]])
         if by == "light":
@@ -194,18 +227,18 @@ class Brdf(Document):
     @classmethod
     @cache
     def is_colour(cls, name: str) -> bool:
-        """Whether the parameter has three channels."""
+        """Returns whether the parameter is a colour."""
         default = cls.model_fields[name].default
         same_as = cls.parameters()[name].same_as
         return cls.is_colour(same_as) if default is None and same_as else isinstance(default, tuple)
 
     @classmethod
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        """The bounds are checked by `_within`; here the schema learns of them."""
+        """Adds the parameters' bounds to the JSON schema. pydantic does not know them, because `_within` checks them."""
         described = handler(schema)
         properties = handler.resolve_ref_schema(described)["properties"]
         for name, declared in cls.parameters().items():
-            # A copy: fields of one kind share what describes them.
+            # Fields of one type share their description, so a copy is changed.
             properties[name] = deepcopy(properties[name])
             _bound(properties[name], declared)
         return described
@@ -215,17 +248,17 @@ class Brdf(Document):
         if not isinstance(data, Mapping):
             return
         if data.get("normal_map") is not None and data.get("bump_map") is not None:
-            yield ("bump_map",), "not together with normal_map: each says which way the surface faces"
+            yield ("bump_map",), "cannot be used together with normal_map, since both set the normal"
         if not cls.anisotropic and data.get("tangent_direction", 0) != 0:
             name = data.get("brdf", cls.model_fields["brdf"].default)
-            yield ("tangent_direction",), f"{name} is alike all round: it has no direction to turn"
+            yield ("tangent_direction",), f"has no effect, because {name} is isotropic"
 
     @field_validator("*", mode="after")
     @classmethod
     def _within(cls, value: Any, info: ValidationInfo) -> Any:
         declared = cls.parameters().get(info.field_name or "")
         if declared is not None and isinstance(value, Texture) and value.channel and cls.is_colour(info.field_name or ""):
-            raise fault(f'a colour takes three channels, and cannot be told channel = "{value.channel}"')
+            raise fault(f'a colour reads three channels, so channel = "{value.channel}" is not allowed')
         if declared is None or value is None or isinstance(value, Texture):
             return value
         numbers = value if isinstance(value, tuple) else (value,)
@@ -236,26 +269,30 @@ class Brdf(Document):
         return value
 
     def canonical(self, ambient: bool) -> "Brdf":
-        """The simplest model with the same value: lobes of weight zero drop out. `ambient`: whether ambient light counts."""
+        """Returns the simplest material with the same value; lobes of weight zero are left out.
+
+        ambient: whether ambient light reaches the material, so that its ambient reflectance must stay the same too.
+        """
         return self
 
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
-        """f cos [1/sr], (..., 3), in float64; `m` has the parameters as arrays, colours (..., 3) and scalars (...), and the
-        choices as strings.
+        """Returns f cos (..., 3) [1/sr] in float64.
 
-        l, v (..., 3): unit directions in the local frame, z along the normal, x along the tangent.
+        m: the material, with colours (..., 3) and scalars (...) as arrays and options as strings.
+        l: unit directions to the light (..., 3) in the local frame, in which z is the normal and x the tangent.
+        v: unit directions to the viewer (..., 3) in the same frame.
         """
         raise NotImplementedError
 
     @staticmethod
     def ambient_reflectance(m: Any) -> Array:
-        """(..., 3): what the model reflects of ambient light."""
+        """Returns the share of ambient light that the material reflects (..., 3). m: as for `brdf_cos`."""
         raise NotImplementedError
 
 
 class _Asked:
-    """Stands for a material, and notes which parameters are looked at."""
+    """A stand-in for a material that records the parameters which are read."""
 
     def __init__(self, model: type[Brdf], chosen: dict[str, str]) -> None:
         self.names: set[str] = set()
@@ -269,7 +306,7 @@ class _Asked:
 
 
 def _bound(schema: dict[str, Any], declared: Parameter) -> None:
-    """Adds the bounds to every number that the schema allows."""
+    """Adds the bounds to every number in the schema."""
     if schema.get("type") == "number":
         schema["minimum"] = declared.low
         if declared.high is not None:
@@ -280,7 +317,7 @@ def _bound(schema: dict[str, Any], declared: Parameter) -> None:
 
 
 def above_horizon(l: Array, v: Array, value: Array) -> Array:
-    """`value` (..., 3) where both directions are above the horizon, else 0: the contract of every model."""
+    """Returns `value` (..., 3) where both directions are above the horizon, else 0. Every model has to have these zeros."""
     return np.where(((l[..., 2] > 0) & (v[..., 2] > 0))[..., None], value, 0.0)
 
 
@@ -288,7 +325,7 @@ BRDFS: Found[Brdf] = Found("glshade.brdfs", Path(__file__).parent)
 
 
 def numbers(brdf: Brdf) -> dict[str, NDArray[np.float32]]:
-    """name -> value of a material without textures, as the GPU gets it. Errors: ValueError for a texture."""
+    """Returns the parameters of a material without textures by name, rounded to float32. Errors: ValueError for a texture."""
     values = parameter_values(brdf)
     for name, value in values.items():
         if isinstance(value, Texture):
@@ -297,12 +334,15 @@ def numbers(brdf: Brdf) -> dict[str, NDArray[np.float32]]:
 
 
 def widened(brdf: Brdf) -> SimpleNamespace:
-    """The same numbers in float64, with the choices: what `Brdf.brdf_cos` takes. Errors: ValueError for a texture."""
+    """Returns the material as `Brdf.brdf_cos` takes it: the float32 values, widened to float64, and the options.
+
+    Errors: ValueError for a texture.
+    """
     return SimpleNamespace(**{name: value.astype(np.float64) for name, value in numbers(brdf).items()}, **brdf.chosen())
 
 
 def parameter_values(material: Brdf) -> dict[str, Any]:
-    """name -> value, with what is left out filled in."""
+    """Returns the values of the parameters by name. A parameter that was left out has the value of its `same_as`."""
     values = {name: (getattr(material, name), declared.same_as) for name, declared in material.parameters().items()}
     return {
         name: getattr(material, same_as) if value is None and same_as else value for name, (value, same_as) in values.items()

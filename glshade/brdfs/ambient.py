@@ -1,5 +1,6 @@
-"""ambient: reflects ambient light alone."""
+"""ambient: reflects only ambient light."""
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -8,9 +9,15 @@ from glshade.brdfs import Array, Brdf, Colour, Parameter, parameter
 
 
 class Ambient(Brdf):
-    """ka times the ambient light: one constant colour, whatever else shines. f cos is 0."""
+    """Its colour is ka times the ambient light. f cos is 0, so other lights have no effect."""
 
     source: ClassVar[str] = "lecture slides 12, 23"
+    samples: ClassVar[tuple[Mapping[str, Any], ...]] = (
+        {"ka": 1},
+        {"ka": 3},
+        {"ka": 6},
+        {"ka": 10},
+    )
 
     brdf: Literal["ambient"] = "ambient"
     ka: Colour = parameter((0.8, 0.8, 0.8), Parameter("ambient reflectance", base=True))

@@ -1,6 +1,7 @@
-"""ashikhmin_shirley: an anisotropic Phong model with Fresnel and a diffuse term that keeps the energy."""
+"""ashikhmin_shirley: an anisotropic Phong model with Fresnel and an energy-conserving diffuse term."""
 
 import math
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 import numpy as np
@@ -10,15 +11,22 @@ from glshade.brdfs.blinn_phong import half_vector
 
 
 class AshikhminShirley(Brdf):
-    """Anisotropic specular with Schlick's Fresnel over an energy-preserving diffuse term. Reflects ambient light with kd.
+    """An anisotropic specular lobe with Schlick's Fresnel over an energy-conserving diffuse term.
 
-    Reciprocal. kd and ks share no budget: the diffuse term leaves room, and with kd = ks = 1 no more light leaves than arrives.
+    It is reciprocal and reflects ambient light with kd. kd and ks may both be 1, because the diffuse term shrinks as the
+    specular one grows.
 
-    Lecture slide 42 writes (n.u)^2 and (n.v)^2 in the exponent, which are 0; the paper, and this, have (h.u)^2 and (h.v)^2.
+    Lecture slide 42 has (n.u)^2 and (n.v)^2 in the exponent, which are 0. Here they are (h.u)^2 and (h.v)^2, as in the paper.
     """
 
     source: ClassVar[str] = "Ashikhmin and Shirley 2000, eqs. 1-5; lecture slides 40-46"
     isotropic_where: ClassVar[dict[str, str | float]] = {"pv": "pu"}
+    samples: ClassVar[tuple[Mapping[str, Any], ...]] = (
+        {"pu": 10, "pv": 10},
+        {"pu": 100, "pv": 100},
+        {"pu": 1000, "pv": 1000},
+        {"pu": 10, "pv": 1000},
+    )
 
     brdf: Literal["ashikhmin_shirley"] = "ashikhmin_shirley"
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("diffuse reflectance", high=1.0, base=True))
@@ -33,11 +41,11 @@ class AshikhminShirley(Brdf):
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         h, length2 = half_vector(l, v)
         NoL, NoV, NoH = l[..., 2], v[..., 2], h[..., 2]
-        # l.h = |H| / 2 for unit vectors; as a dot product it would feel the rounding of |l| and |v| near l = -v.
+        # l.h = |H| / 2 for unit vectors. A dot product would suffer from the rounding of |l| and |v| near l = -v.
         LoH = np.minimum(0.5 * np.sqrt(length2), 1.0)
         sin2 = h[..., 0] ** 2 + h[..., 1] ** 2
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            # log(n.h) / sin^2, by its limit -1/2 at h = n.
+            # This is log(n.h) / sin^2. At h = n it is 0/0, and the limit -1/2 replaces it.
             log_ratio = np.where(
                 sin2 < 0.5, np.where(sin2 > 0, np.log1p(-np.minimum(sin2, 0.5)) / (2 * sin2), -0.5), np.log(NoH) / sin2
             )

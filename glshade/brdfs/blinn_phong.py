@@ -11,15 +11,15 @@ from glshade.brdfs.phong import power_of_cosine, without_lobe
 
 
 class BlinnPhong(Brdf):
-    """(kd n.l + ks max(n.h, 0)^exponent) / pi, h = (l + v)/|l + v|. Its lobe is wider than phong's at the same exponent.
+    """(kd n.l + ks max(n.h, 0)^exponent) / pi with h = (l + v)/|l + v|. Its lobe is wider than phong's at the same exponent.
 
-    Where l = -v there is no half vector, and no specular light. Reflects ambient light with ka.
+    It reflects ambient light with ka. Where l = -v there is no half vector, and the specular part is 0.
     """
 
     source: ClassVar[str] = "Blinn 1977; lecture slide 20"
     breaks: ClassVar[dict[Law, str]] = {
-        "reciprocity": "the lobe is not divided by n.l, as in phong",
-        "energy": "the lobe reflects more than ks where p is small: up to 2 ks at p = 0, 1.72 ks at p = 1, ks at p = 5.4",
+        "reciprocity": "as in phong, the lobe is not divided by n.l",
+        "energy": "the lobe reflects more than ks where p is below 5.4: 1.72 ks at p = 1, 2 ks at p = 0",
     }
     shares: ClassVar[tuple[str, ...]] = ("kd", "ks")
 
@@ -27,7 +27,7 @@ class BlinnPhong(Brdf):
     kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance", base=True))
     ks: Colour = parameter((0.2, 0.2, 0.2), Parameter("specular strength at the lobe's centre"))
     exponent: Scalar = parameter(128.0, Parameter("narrowness of the lobe, p", high=1e8, usual=(1.0, 1000.0)))
-    ka: Colour | None = parameter(None, Parameter("ambient reflectance; left out: kd", same_as="kd"))
+    ka: Colour | None = parameter(None, Parameter("ambient reflectance; default: kd", same_as="kd"))
 
     @classmethod
     def limits(cls) -> tuple[Limit, ...]:
@@ -52,7 +52,10 @@ class BlinnPhong(Brdf):
 
 
 def half_vector(l: Array, v: Array) -> tuple[Array, Array]:
-    """h (..., 3), unit, and |l + v|^2 (...). Below 1e-12 (l = -v to float32 rounding) h is not to be used."""
+    """Returns the unit half vectors h (..., 3), and |l + v|^2 (...).
+
+    Where |l + v|^2 is below 1e-12, l = -v within float32 rounding, and h must not be used.
+    """
     H = l + v
     length2 = np.sum(H * H, axis=-1)
     return H / np.sqrt(np.maximum(length2, 1e-12))[..., None], length2

@@ -12,12 +12,12 @@ from glshade.brdfs.phong import power_of_cosine, without_lobe
 
 
 class BlinnPhongNormalised(Brdf):
-    """(kd/pi + ks c(p) max(n.h, 0)^p) n.l, c(p) = (p + 2)(p + 4) / (8 pi (2^(-p/2) + p)), p the exponent.
+    """(kd/pi + ks c(p) max(n.h, 0)^p) n.l with c(p) = (p + 2)(p + 4) / (8 pi (2^(-p/2) + p)), where p is the exponent.
 
-    c makes the lobe's albedo at normal incidence ks, for every p. With v = n and t the angle to l, n.h = u = cos(t/2),
-    n.l = 2 u^2 - 1 and dw = 2 pi sin t dt = 8 pi u du (u falling), so that 1/c is the integral of 8 pi u^(p+1) (2 u^2 - 1)
-    over u from 1/sqrt 2 to 1. The common (p + 8)/(8 pi) is up to 7.5 % too much.
-    Reciprocal; towards grazing angles the lobe loses light. Reflects ambient light with kd.
+    c makes the lobe's albedo at normal incidence ks for every p. With v = n and t the angle to l, n.h = u = cos(t/2),
+    n.l = 2 u^2 - 1 and the solid angle dw = 2 pi sin t dt = 8 pi u du, so that 1/c is the integral of 8 pi u^(p+1) (2 u^2 - 1)
+    over u from 1/sqrt 2 to 1. The common factor (p + 8)/(8 pi) is up to 7.5 % too large. The model is reciprocal and reflects
+    ambient light with kd. Towards grazing angles the lobe loses light.
     """
 
     source: ClassVar[str] = "Blinn 1977; normalised after Giesen 2009"

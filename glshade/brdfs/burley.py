@@ -1,4 +1,4 @@
-"""burley: Disney's diffuse."""
+"""burley: Disney's diffuse model."""
 
 import math
 from collections.abc import Mapping
@@ -10,15 +10,16 @@ from glshade.brdfs import Array, Brdf, Colour, Law, Parameter, Scalar, above_hor
 
 
 class Burley(Brdf):
-    """kd/pi (1 + (F90-1)(1-n.l)^5) (1 + (F90-1)(1-n.v)^5) n.l, F90 = 1/2 + 2 roughness (l.h)^2. Takes roughness, not alpha.
+    """kd/pi (1 + (F90-1)(1-n.l)^5) (1 + (F90-1)(1-n.v)^5) n.l with F90 = 1/2 + 2 roughness (l.h)^2.
 
-    A fit by eye to measured materials: smooth surfaces darken at grazing angles, rough ones brighten towards the light.
-    Reciprocal. Reflects ambient light with kd. At no roughness is it lambert.
+    Its roughness is not squared. It was fitted by eye to measured materials: smooth surfaces darken at grazing angles, rough
+    ones brighten there, mostly when seen from the side of the light. It is reciprocal and reflects ambient light with kd. No
+    roughness makes it equal to lambert.
     """
 
     source: ClassVar[str] = "Burley 2012, section 5.3"
     breaks: ClassVar[Mapping[Law, str]] = {
-        "energy": "fitted by eye: gives back up to 1.56 of grazing light, at roughness 1 and kd 1"
+        "energy": "it is a fit by eye, which reflects up to 1.56 times the light at grazing angles (roughness 1, kd 1)"
     }
 
     brdf: Literal["burley"] = "burley"
@@ -28,7 +29,7 @@ class Burley(Brdf):
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         H = l + v
-        value = burley(m.roughness, l[..., 2], v[..., 2], 0.25 * np.sum(H * H, axis=-1))
+        value = burley_diffuse(m.roughness, l[..., 2], v[..., 2], 0.25 * np.sum(H * H, axis=-1))
         return above_horizon(l, v, m.kd * value[..., None])
 
     @staticmethod
@@ -36,7 +37,7 @@ class Burley(Brdf):
         return m.kd  # type: ignore[no-any-return]
 
 
-def burley(roughness: Array, NoL: Array, NoV: Array, LoH2: Array) -> Array:
-    """f cos (...) of the lobe with reflectance 1; LoH2 = (l.h)^2."""
+def burley_diffuse(roughness: Array, NoL: Array, NoV: Array, LoH2: Array) -> Array:
+    """Returns f cos (...) [1/sr] of Burley's diffuse lobe with reflectance 1. LoH2 (...): (l.h)^2."""
     f90 = 0.5 + 2 * roughness * LoH2
     return NoL / math.pi * (1 + (f90 - 1) * (1 - NoL) ** 5) * (1 + (f90 - 1) * (1 - NoV) ** 5)

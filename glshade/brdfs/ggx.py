@@ -1,11 +1,12 @@
 """ggx: the metallic-roughness material of glTF."""
 
 import math
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from glshade.brdfs import Array, Brdf, Colour, Law, Limit, Parameter, Scalar, above_horizon, choice, parameter
+from glshade.brdfs import Array, Brdf, Colour, Law, Limit, Parameter, Scalar, Slot, above_horizon, choice, parameter
 from glshade.brdfs.blinn_phong import half_vector
 from glshade.brdfs.metal import Metal, brushed, cos_half, ggx_slot
 from glshade.optics.fresnel import f_schlick, t_schlick
@@ -13,32 +14,39 @@ from glshade.optics.microfacet import ggx_cos
 
 
 class Ggx(Brdf):
-    """kd (1 - metallic)/pi (1 - F) n.l + F D(h) G2(l, v) / (4 n.v), F Schlick's of mix(f0, kd, metallic) at l.h.
+    """kd (1 - metallic)/pi (1 - F) n.l + F D(h) G2(l, v) / (4 n.v), where F is Schlick's for mix(f0, kd, metallic) at l.h.
 
-    GGX with Smith's height-correlated shadowing. Reciprocal, because l.h is the same from both sides. Reflects ambient light
-    with kd: the diffuse colour of a dielectric, what a metal reflects at normal incidence. Rough metals are darker than real
-    ones, where light leaves after several reflections. Where l = -v there is no half vector, and no specular light. Many
-    implementations take alpha^2 cos^2 - cos^2 + 1, wrong by 79 % at alpha 1e-3.
+    D is GGX, and G2 is Smith's height-correlated shadowing. The model is reciprocal, because l.h = v.h. It reflects ambient
+    light with kd, which is the diffuse colour of a dielectric and the reflectance of a metal at normal incidence. Rough metals
+    are darker than real ones, because light that is reflected several times between facets is lost. Where l = -v there is no
+    half vector, and the specular part is 0. Many implementations compute D by alpha^2 cos^2 - cos^2 + 1, which in float32 is
+    wrong by 79 % at alpha 1e-3.
     """
 
     source: ClassVar[str] = "glTF 2.0, appendix B.3; Walter et al. 2007, eqs. 20, 33; Heitz 2014, eq. 99"
     breaks: ClassVar[dict[Law, str]] = {
-        "energy": "the diffuse part makes way for what one facet reflects, not for the whole lobe: a white dielectric of "
-        "roughness 0.1 gives back 1.7 times the light at grazing angles, of roughness 0.5 1.15 times; metallic = 1 keeps it"
+        "energy": "the diffuse part shrinks by the reflectance of one facet, not by that of the whole lobe: at grazing angles "
+        "a white dielectric reflects 1.7 times the light at roughness 0.1 and 1.15 times at roughness 0.5; metals keep the law"
     }
     isotropic_where: ClassVar[dict[str, str | float]] = {"anisotropy": 0.0}
+    samples: ClassVar[tuple[Mapping[str, Any], ...]] = (
+        {"metallic": 0, "roughness": 0.3},
+        {"metallic": 0, "roughness": 0.7},
+        {"metallic": 1, "roughness": 0.3},
+        {"metallic": 1, "roughness": 0.5, "anisotropy": 0.9},
+    )
 
     brdf: Literal["ggx"] = "ggx"
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("base colour", high=1.0, base=True))
     f0: Colour = parameter((0.04, 0.04, 0.04), Parameter("a dielectric's reflectance at normal incidence", high=1.0))
-    metallic: Scalar = parameter(0.0, Parameter("from dielectric (0) to metal (1)", high=1.0))
-    roughness: Scalar = parameter(0.5, Parameter("square root of the width of the lobe, alpha", high=1.0, usual=(0.1, 1.0)))
-    anisotropy: Scalar = parameter(0.0, Parameter("how much longer highlights are along the tangent", high=1.0))
-    lobes: Literal["all", "specular"] = choice("all", "specular: without diffuse light")
+    metallic: Scalar = parameter(0.0, Parameter("0: dielectric, 1: metal", high=1.0))
+    roughness: Scalar = parameter(0.5, Parameter("square root of alpha, the width of the lobe", high=1.0, usual=(0.1, 1.0)))
+    anisotropy: Scalar = parameter(0.0, Parameter("how far highlights are stretched along the tangent", high=1.0))
+    lobes: Literal["all", "specular"] = choice("all", "all, or specular: without the diffuse lobe")
 
     @classmethod
     def limits(cls) -> tuple[Limit, ...]:
-        # (n - 1)^2 + k^2 over (n + 1)^2 + k^2: numbers that float32 holds.
+        # f0 = ((eta - 1)^2 + k^2) / ((eta + 1)^2 + k^2). All these numbers are exact in float32.
         f0, eta, k = (0.25, 0.5, 0.625), (3.0, 1.0, 3.0), (0.0, 2.0, 4.0)
         metal = Metal(eta=eta, k=k, roughness=0.4, anisotropy=0.5, fresnel="schlick")
         return (
@@ -50,10 +58,10 @@ class Ggx(Brdf):
     def needs_tangents(self) -> bool:
         return brushed(self.anisotropy)
 
-    def slots(self) -> dict[str, str]:
+    def slots(self) -> dict[str, Slot]:
         dark = self.lobes == "specular" or self.metallic == 1 or self.kd == (0.0, 0.0, 0.0)
         diffuse = "none" if dark else "beside_schlick"
-        return {"ggx": ggx_slot(self.anisotropy), "diffuse": f'#include "microfacet/diffuse_{diffuse}.glsl"\n'}
+        return {"ggx": ggx_slot(self.anisotropy), "diffuse": Slot((f"microfacet/diffuse_{diffuse}.glsl",))}
 
     def asked(self, by: Literal["light", "ambient"]) -> frozenset[str]:
         return super().asked(by) - ({"anisotropy"} if not self.needs_tangents else set())

@@ -1,4 +1,4 @@
-"""minnaert: surfaces that darken, or brighten, towards the limb."""
+"""minnaert: surfaces that darken or brighten towards their outline."""
 
 import math
 from typing import Any, ClassVar, Literal
@@ -11,21 +11,23 @@ from glshade.brdfs.ward import GRAZING
 
 
 class Minnaert(Brdf):
-    """kd (k + 1)/(2 pi) ((n.l) (n.v))^(k - 1) n.l. Reciprocal. Reflects ambient light with kd.
+    """kd (k + 1)/(2 pi) ((n.l) (n.v))^(k - 1) n.l. It is reciprocal and reflects ambient light with kd.
 
-    The albedo is kd (n.v)^(k - 1): kd at normal incidence. k = 1 is lambert; with the light behind the viewer a sphere of
-    k = 1/2 is an even disc, as the full moon nearly is. Below k = 1 the power has a pole where a cosine is 0: there each cosine
-    in it counts as 2^-20 where it is smaller. In a picture no viewer is that low: n.v is 1e-3 at least.
+    The albedo is kd (n.v)^(k - 1), which is kd at normal incidence. k = 1 is lambert. With the light behind the viewer, a
+    sphere of k = 1/2 is an even disc, as the full moon nearly is. Below k = 1 the power has a pole where a cosine is 0, so
+    that cosines below 2^-20 count as 2^-20 in the power. In a picture n.v is at least 1e-3, so only n.l can be so small.
     """
 
     source: ClassVar[str] = "Minnaert 1941"
     breaks: ClassVar[dict[Law, str]] = {
-        "energy": "with k below 1 the albedo kd (n.v)^(k - 1) grows without bound towards grazing"
+        "energy": "with k below 1 the albedo kd (n.v)^(k - 1) grows without bound towards grazing angles"
     }
 
     brdf: Literal["minnaert"] = "minnaert"
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("diffuse reflectance: the albedo at normal incidence", base=True))
-    k: Scalar = parameter(0.7, Parameter("limb darkening; 1: none, below 1: the limb is brighter", high=10.0, usual=(0.5, 2.0)))
+    k: Scalar = parameter(
+        0.7, Parameter("limb darkening; 1: none, below 1: the outline is brighter", high=10.0, usual=(0.5, 2.0))
+    )
 
     @classmethod
     def limits(cls) -> tuple[Limit, ...]:

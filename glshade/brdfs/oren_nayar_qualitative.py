@@ -1,4 +1,4 @@
-"""oren_nayar_qualitative: oren_nayar in its short form."""
+"""oren_nayar_qualitative: the short form of oren_nayar."""
 
 import math
 from collections.abc import Mapping
@@ -12,18 +12,23 @@ from glshade.brdfs.oren_nayar import as_lambert
 
 
 class OrenNayarQualitative(Brdf):
-    """kd/pi (A + B max(0, cos(dphi)) sin(a) tan(b)) n.l, A = 1 - s^2/2/(s^2 + 0.33), B = 0.45 s^2/(s^2 + 0.09). Reciprocal.
+    """kd/pi (A + B max(0, cos(dphi)) sin(a) tan(b)) n.l with A = 1 - s^2/2/(s^2 + 0.33), B = 0.45 s^2/(s^2 + 0.09), s = sigma.
 
-    Reflects ambient light with kd. Two faults of widely copied code: A = 1 + s^2 (...), 3.6 times too bright at sigma 1; and
-    l.v clamped to [eps, 1], which adds up to B where l and v graze the surface on opposite sides.
+    The angles are those of oren_nayar. The model is reciprocal and reflects ambient light with kd. Widely copied code has two
+    faults: A = 1 + s^2 (...), which is 3.6 times too bright at sigma 1; and l.v clamped to [eps, 1], which adds up to B where l
+    and v graze the surface on opposite sides.
     """
 
     source: ClassVar[str] = "Oren and Nayar 1994, eq. 31"
-    breaks: ClassVar[Mapping[Law, str]] = {"energy": "the fit gives back up to 1.016 of grazing light, at sigma 0.2 and kd 1"}
+    breaks: ClassVar[Mapping[Law, str]] = {
+        "energy": "the fit reflects up to 1.016 times the light at grazing angles (sigma 0.2, kd 1)"
+    }
 
     brdf: Literal["oren_nayar_qualitative"] = "oren_nayar_qualitative"
     kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance of a facet", high=1.0, base=True))
-    sigma: Scalar = parameter(0.3, Parameter("roughness: deviation of the facets' slope angle", high=1.5707963, unit="rad"))
+    sigma: Scalar = parameter(
+        0.3, Parameter("roughness: standard deviation of the facets' slope angle", high=1.5707963, unit="rad")
+    )
 
     @classmethod
     def limits(cls) -> tuple[Limit, ...]:
@@ -36,7 +41,7 @@ class OrenNayarQualitative(Brdf):
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
         NoL, NoV = np.maximum(l[..., 2], 0.0), np.maximum(v[..., 2], 0.0)
-        # cos(dphi) sin(alpha) sin(beta): what l and v have across the normal.
+        # The dot product of the parts of l and v across the normal is cos(dphi) sin(a) sin(b).
         across = l[..., 0] * v[..., 0] + l[..., 1] * v[..., 1]
         s2 = m.sigma**2
         a = 1 - 0.5 * s2 / (s2 + 0.33)

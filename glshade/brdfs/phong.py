@@ -1,4 +1,4 @@
-"""phong: ambient, diffuse and a specular lobe about the mirror direction."""
+"""phong: ambient light, diffuse light and a specular lobe around the mirror direction."""
 
 import math
 from typing import Any, ClassVar, Literal
@@ -11,15 +11,16 @@ from glshade.textures.texture import Texture
 
 
 class Phong(Brdf):
-    """(kd n.l + ks max(r.v, 0)^exponent) / pi, r = 2 (n.l) n - l. Made up, not reciprocal. Reflects ambient light with ka.
+    """(kd n.l + ks max(r.v, 0)^exponent) / pi with r = 2 (n.l) n - l.
 
-    Slides 18 and 24 do not gate the lobe by n.l, so that light from behind could leak through r.v > 0; here it is 0.
+    It is empirical and not reciprocal, and it reflects ambient light with ka. Slides 18 and 24 do not check the sign of n.l, so
+    that light from behind the surface could show where r.v > 0. Here f cos is 0 for such light.
     """
 
     source: ClassVar[str] = "Phong 1975; lecture slides 12, 17-24"
     breaks: ClassVar[dict[Law, str]] = {
-        "reciprocity": "the lobe is not divided by n.l: the lecture's model, made up, has f cos = ks (r.v)^p / pi",
-        "energy": "the lobe reflects 2 ks/(p + 1) at normal incidence: more than ks where p is below 1",
+        "reciprocity": "the lobe is not divided by n.l: the lecture's empirical model has f cos = ks (r.v)^p / pi",
+        "energy": "the lobe reflects 2 ks/(p + 1) at normal incidence, which is more than ks where p is below 1",
     }
     shares: ClassVar[tuple[str, ...]] = ("kd", "ks")
 
@@ -27,7 +28,7 @@ class Phong(Brdf):
     kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance", base=True))
     ks: Colour = parameter((0.2, 0.2, 0.2), Parameter("specular strength at the lobe's centre"))
     exponent: Scalar = parameter(32.0, Parameter("narrowness of the lobe, p", high=1e8, usual=(1.0, 1000.0)))
-    ka: Colour | None = parameter(None, Parameter("ambient reflectance; left out: kd", same_as="kd"))
+    ka: Colour | None = parameter(None, Parameter("ambient reflectance; default: kd", same_as="kd"))
 
     @classmethod
     def limits(cls) -> tuple[Limit, ...]:
@@ -45,7 +46,7 @@ class Phong(Brdf):
 
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
-        # In the local frame the mirror direction is l turned half round the normal.
+        # In the local frame the mirror direction is l with x and y negated.
         r = l * np.array([-1.0, -1.0, 1.0])
         lobe = power_of_cosine(r, v, m.exponent)
         return above_horizon(l, v, (m.kd * l[..., 2:] + m.ks * lobe[..., None]) / math.pi)
@@ -56,7 +57,10 @@ class Phong(Brdf):
 
 
 def without_lobe(material: Any, ambient: bool) -> Brdf:
-    """Lambert in place of kd and a lobe whose ks is zero, unless ambient light would show a ka of its own."""
+    """Returns a lambert if the material's ks is 0, and otherwise the material itself.
+
+    ambient: whether ambient light reaches the material. If so, a ka that differs from kd keeps the material as it is.
+    """
     ka = getattr(material, "ka", None)
     if material.ks == (0.0, 0.0, 0.0) and not (ambient and ka not in (None, material.kd)):
         surface = {name: getattr(material, name) for name in Brdf.model_fields if name != "brdf"}
@@ -65,7 +69,10 @@ def without_lobe(material: Any, ambient: bool) -> Brdf:
 
 
 def with_half_angle(material: Any, model: str) -> Brdf:
-    """The material in the model that has h in place of r. At normal incidence h turns half as far as r: four times p."""
+    """Returns the material in the half-angle model.
+
+    The angle between n and h is about half the angle between r and v, so the exponent becomes four times as large.
+    """
     p = material.exponent
     fourfold = p.model_copy(update={"factor": tuple(4 * x for x in p.factor)}) if isinstance(p, Texture) else min(4 * p, 1e8)
     values = {name: getattr(material, name) for name in type(material).model_fields}
@@ -73,9 +80,9 @@ def with_half_angle(material: Any, model: str) -> Brdf:
 
 
 def power_of_cosine(a: Array, b: Array, p: Array) -> Array:
-    """max(a.b, 0)^p for unit vectors a, b (..., 3); 0^0 counts as 0, because a lobe ends at its horizon."""
+    """Returns max(a.b, 0)^p (...) for unit vectors a, b (..., 3). 0^0 is taken as 0, because a lobe ends at its horizon."""
     c = np.einsum("...i,...i->...", a, b)
-    # Near 1 the cosine has lost its digits even in float64 (an error of p * 1e-16); 1 - a.b = |a - b|^2 / 2 has not.
+    # For cosines near 1 the power would have an error of p * 1e-16 even in float64. 1 - a.b = |a - b|^2 / 2 keeps all digits.
     s = 0.5 * np.sum((a - b) ** 2, axis=-1)
     with np.errstate(divide="ignore", invalid="ignore"):
         log_c = np.where(s < 0.5, np.log1p(-np.minimum(s, 0.5)), np.log(np.maximum(c, 1e-300)))

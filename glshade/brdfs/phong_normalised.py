@@ -1,4 +1,4 @@
-"""phong_normalised: phong with a lobe that reflects ks of the light and no more."""
+"""phong_normalised: phong with a lobe whose albedo at normal incidence is ks."""
 
 import math
 from typing import Any, ClassVar, Literal
@@ -11,9 +11,10 @@ from glshade.brdfs.phong import power_of_cosine, with_half_angle, without_lobe
 
 
 class PhongNormalised(Brdf):
-    """(kd/pi + ks (p + 2)/(2 pi) max(r.v, 0)^p) n.l, r = 2 (n.l) n - l, p the exponent. Reflects ambient light with kd.
+    """(kd/pi + ks (p + 2)/(2 pi) max(r.v, 0)^p) n.l with r = 2 (n.l) n - l, where p is the exponent.
 
-    Reciprocal. The albedo is kd + ks at normal incidence, and less wherever the horizon cuts the lobe.
+    It is reciprocal and reflects ambient light with kd. The albedo is kd + ks at normal incidence, and less where the horizon
+    cuts the lobe.
     """
 
     source: ClassVar[str] = "Lafortune and Willems 1994; Lewis 1993"
@@ -40,7 +41,7 @@ class PhongNormalised(Brdf):
 
     @staticmethod
     def brdf_cos(m: Any, l: Array, v: Array) -> Array:
-        # In the local frame the mirror direction is l turned half round the normal.
+        # In the local frame the mirror direction is l with x and y negated.
         r = np.concatenate([-l[..., :2], l[..., 2:]], axis=-1)
         lobe = (m.exponent + 2) / (2 * math.pi) * power_of_cosine(r, v, m.exponent)
         return above_horizon(l, v, (m.kd / math.pi + m.ks * lobe[..., None]) * l[..., 2:])

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from glshade.brdfs import Array, Brdf, Colour, Law, Limit, Parameter, Scalar, above_horizon, choice, parameter
+from glshade.brdfs import Array, Brdf, Colour, Law, Limit, Parameter, Scalar, Slot, above_horizon, choice, parameter
 from glshade.brdfs.blinn_phong import half_vector
 from glshade.brdfs.lambert import Lambert
 from glshade.brdfs.metal import Metal
@@ -17,23 +17,33 @@ from glshade.optics.microfacet import ggx_cos
 
 
 class Plastic(Brdf):
-    """(D V F(l.h) + kd/pi (1-F(n.l)) (1-F(n.v)) / (ior^2 (1 - kd F_inside))) n.l, GGX. Reciprocal.
+    """(D V F(l.h) + kd/pi (1-F(n.l)) (1-F(n.v)) / (ior^2 (1 - kd F_inside))) n.l, where D and V are GGX.
 
-    What the smooth surface passes goes in, is scattered, reflected back at the surface from inside (F_inside of it) any number
-    of times, and goes out; of a white base all of it comes out. Without a surface (ior 1) it is lambert. Reflects ambient light
-    with kd.
+    D is the distribution of facets, and V is their shadowing divided by 4 n.l n.v. Light that a smooth surface transmits is
+    scattered by the base below it. The surface reflects the share F_inside of the scattered light back to the base, any number
+    of times, and the rest leaves. From a white base all light leaves in the end. An ior of 1, which means no surface, gives
+    lambert. The model is reciprocal and reflects ambient light with kd.
     """
 
     source: ClassVar[str] = "Walter et al. 2007, eqs. 20-34; Wolff 1994; Jakob 2010 (Mitsuba's plastic); Walsh 1926"
     breaks: ClassVar[Mapping[Law, str]] = {
-        "energy": "in goes what a smooth surface passes, and a rough one reflects a little more: 1.0007, with Schlick 1.0024"
+        "energy": "the base gets the light that a smooth surface transmits, although a rough one reflects slightly more: up to "
+        "1.0007 times the light leaves, and 1.0024 times with Schlick"
     }
+    samples: ClassVar[tuple[Mapping[str, Any], ...]] = (
+        {"roughness": 0.1},
+        {"roughness": 0.3},
+        {"roughness": 0.6},
+        {"roughness": 1},
+    )
 
     brdf: Literal["plastic"] = "plastic"
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("diffuse reflectance of the base", high=1.0, base=True))
     ior: Scalar = parameter(1.5, Parameter("index of refraction", low=1.0, high=3.0, usual=(1.0, 2.5)))
-    roughness: Scalar = parameter(0.2, Parameter("roughness of the surface, the root of alpha", high=1.0))
-    fresnel: Literal["exact", "schlick"] = choice("exact", "Fresnel's formulas, or Schlick's approximation everywhere")
+    roughness: Scalar = parameter(0.2, Parameter("roughness of the surface, the square root of alpha", high=1.0))
+    fresnel: Literal["exact", "schlick"] = choice(
+        "exact", "exact: Fresnel's formulas; schlick: Schlick's approximation of all of them"
+    )
 
     @classmethod
     def limits(cls) -> tuple[Limit, ...]:
@@ -47,8 +57,8 @@ class Plastic(Brdf):
     def canonical(self, ambient: bool) -> Brdf:
         return as_lambert(self) if self.ior == 1.0 and self.fresnel == "exact" else self
 
-    def slots(self) -> dict[str, str]:
-        return {"interface": f'#include "lobe/interface_{self.fresnel}.glsl"\n'}
+    def slots(self) -> dict[str, Slot]:
+        return {"interface": Slot((f"lobe/interface_{self.fresnel}.glsl",))}
 
     def specular_part(self) -> Brdf:
         return self.without_base()
@@ -70,7 +80,8 @@ class Plastic(Brdf):
 
 
 def interface(fresnel: str, ior: Array, LoH: Array, NoL: Array, NoV: Array) -> tuple[Array, Array, Array]:
-    """What a facet reflects, what passes in and out again, and what is reflected of diffuse light from outside; (...) each."""
+    """Returns three values (...): the reflectance of a facet, the transmittance on the way in times that on the way out, and
+    the share of diffuse light from outside that the surface reflects."""
     if fresnel == "exact":
         return f_dielectric(LoH, ior), t_dielectric(NoL, ior) * t_dielectric(NoV, ior), diffuse_fresnel(ior)
     f0 = ((ior - 1) / (ior + 1)) ** 2
@@ -80,10 +91,10 @@ def interface(fresnel: str, ior: Array, LoH: Array, NoL: Array, NoV: Array) -> t
 
 
 def under_interface(kd: Array, ior: Array, outside: Array) -> Array:
-    """(..., 3): kd / (ior^2 (1 - kd F_inside)), what light that has gone in makes of it before it goes out.
+    """Returns kd / (ior^2 (1 - kd F_inside)) (..., 3): the base's colour after all reflections between base and surface.
 
-    outside (...): F_outside, the share of diffuse light from outside that the surface reflects. As light takes the same ways
-    in and out, ior^2 (1 - F_inside) = 1 - F_outside.
+    outside (...): F_outside, the share of diffuse light from outside that the surface reflects. Light paths are reversible, so
+    ior^2 (1 - F_inside) = 1 - F_outside.
     """
     result: Array = kd / (ior[..., None] ** 2 * (1 - kd) + kd * (1 - outside[..., None]))
     return result

@@ -1,4 +1,4 @@
-"""principled: Disney's model of 2012."""
+"""principled: Disney's principled model of 2012."""
 
 import math
 from collections.abc import Mapping
@@ -6,48 +6,56 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 
-from glshade.brdfs import Array, Brdf, Colour, Law, Limit, Parameter, Scalar, above_horizon, choice, parameter
+from glshade.brdfs import Array, Brdf, Colour, Law, Limit, Parameter, Scalar, Slot, above_horizon, choice, parameter
 from glshade.brdfs.blinn_phong import half_vector
-from glshade.brdfs.burley import burley
+from glshade.brdfs.burley import burley_diffuse
 
-# The narrowest highlight that the published reference implementation (BRDF Explorer) draws.
+# The smallest width of a highlight in the published reference implementation (BRDF Explorer).
 LEAST_ALPHA = 0.001
 
 
 class Principled(Brdf):
-    """Burley's diffuse, flat subsurface, sheen, an anisotropic GGX highlight and a clear coat. Reciprocal.
+    """The sum of Burley's diffuse lobe, a flat subsurface lobe, sheen, an anisotropic GGX highlight and a clear coat.
 
-    As published in 2012: the highlight's shadowing is Smith's, separable, isotropic and of width (1/2 + roughness/2)^2; the
-    coat's distribution falls off as 1/sin^2, its shadowing is of width 1/4, its strength a quarter, its F0 0.04. Revisions of
-    2014 and 2015 are other models. The base colour is kd, linear. Reflects ambient light with kd.
+    It is the model as published in 2012. The highlight's shadowing is Smith's, separable and isotropic with the width (1/2 +
+    roughness/2)^2. The coat's distribution falls off as 1/sin^2, its shadowing has the width 1/4, its strength is a quarter,
+    and its F0 is 0.04. The revisions of 2014 and 2015 are different models. The base colour is kd, in linear light. The model
+    is reciprocal and reflects ambient light with kd.
     """
 
     source: ClassVar[str] = "Burley 2012, section 5 and appendix B; the BRDF Explorer's disney.brdf of that year"
     breaks: ClassVar[Mapping[Law, str]] = {
-        "energy": "lobes fitted one by one add up to as much as 1.7 of grazing light, at roughness 1 with sheen and coat"
+        "energy": "each lobe was fitted alone; together they reflect up to 1.7 times the light at grazing angles (roughness 1, "
+        "sheen and clear coat 1)"
     }
     isotropic_where: ClassVar[Mapping[str, str | float]] = {"anisotropy": 0.0}
+    samples: ClassVar[tuple[Mapping[str, Any], ...]] = (
+        {"roughness": 0.3},
+        {"roughness": 0.8, "sheen": 1},
+        {"metallic": 1, "roughness": 0.5, "anisotropy": 0.9},
+        {"roughness": 0.7, "clearcoat": 1},
+    )
 
     brdf: Literal["principled"] = "principled"
     kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("base colour", high=1.0, base=True))
     metallic: Scalar = parameter(0.0, Parameter("0: dielectric, 1: metal", high=1.0))
-    subsurface: Scalar = parameter(0.0, Parameter("how much of the diffuse has the flat shape of subsurface light", high=1.0))
+    subsurface: Scalar = parameter(0.0, Parameter("share of the flat subsurface lobe in the diffuse light", high=1.0))
     specular: Scalar = parameter(0.5, Parameter("strength of the highlight: F0 = 0.08 specular", high=1.0))
-    roughness: Scalar = parameter(0.5, Parameter("roughness, the root of alpha", high=1.0))
-    specular_tint: Scalar = parameter(0.0, Parameter("how much of the base colour's hue the highlight has", high=1.0))
-    anisotropy: Scalar = parameter(0.0, Parameter("how much longer the highlight is along the tangent", high=1.0))
-    sheen: Scalar = parameter(0.0, Parameter("light at grazing angles, for cloth", high=1.0))
-    sheen_tint: Scalar = parameter(0.5, Parameter("how much of the base colour's hue the sheen has", high=1.0))
-    clearcoat: Scalar = parameter(0.0, Parameter("strength of the second highlight", high=1.0))
-    clearcoat_gloss: Scalar = parameter(1.0, Parameter("0: satin, 1: gloss", high=1.0))
-    lobes: Literal["all", "specular"] = choice("all", "specular: without diffuse light and sheen")
+    roughness: Scalar = parameter(0.5, Parameter("roughness, the square root of alpha", high=1.0))
+    specular_tint: Scalar = parameter(0.0, Parameter("how far the highlight takes the hue of the base colour", high=1.0))
+    anisotropy: Scalar = parameter(0.0, Parameter("how far the highlight is stretched along the tangent", high=1.0))
+    sheen: Scalar = parameter(0.0, Parameter("extra light at grazing angles, as cloth has", high=1.0))
+    sheen_tint: Scalar = parameter(0.5, Parameter("how far the sheen takes the hue of the base colour", high=1.0))
+    clearcoat: Scalar = parameter(0.0, Parameter("strength of the clear coat's highlight", high=1.0))
+    clearcoat_gloss: Scalar = parameter(1.0, Parameter("gloss of the clear coat; 0: satin, 1: glossy", high=1.0))
+    lobes: Literal["all", "specular"] = choice("all", "all, or specular: without the diffuse lobes and sheen")
 
     @classmethod
     def limits(cls) -> tuple[Limit, ...]:
         some: Any = {"kd": (0.8, 0.5, 0.2), "roughness": 0.4}
         return (
             Limit(
-                "a metal has no diffuse, no sheen and no specular of its own",
+                "a metal ignores subsurface, sheen, specular and specular_tint",
                 cls(**some, metallic=1.0, subsurface=0.5, sheen=1.0, specular=1.0, specular_tint=1.0),
                 cls(**some, metallic=1.0),
             ),
@@ -64,7 +72,7 @@ class Principled(Brdf):
         return self.anisotropy != 0.0
 
     def _parts(self) -> set[str]:
-        """What is in the program; a texture is never nothing, nor all."""
+        """Returns the names of the parts that the program has. A textured weight counts as neither 0 nor 1."""
         base = self.metallic != 1.0
         below = base and self.lobes == "all"
         parts = {
@@ -79,12 +87,16 @@ class Principled(Brdf):
         }
         return {name for name, there in parts.items() if there}
 
-    def slots(self) -> dict[str, str]:
+    def slots(self) -> dict[str, Slot]:
         parts = self._parts()
         files: list[str] = [name for name in ("burley", "flat_subsurface") if name in parts]
-        files += ["tint"] * bool(parts & {"sheen_tint", "specular_tint"})
-        files += ["gtr2_anisotropic" if self.needs_tangents else "gtr2_isotropic"] + ["clearcoat"] * ("clearcoat" in parts)
-        diffuse = [f"{name}(m.roughness, NoL, NoV, LoH2)" for name in ("burley", "flat_subsurface") if name in parts]
+        if parts & {"sheen_tint", "specular_tint"}:
+            files.append("tint")
+        files.append("gtr2_anisotropic" if self.needs_tangents else "gtr2_isotropic")
+        if "clearcoat" in parts:
+            files.append("clearcoat")
+        functions = {"burley": "burley_diffuse", "flat_subsurface": "flat_subsurface"}
+        diffuse = [f"{function}(m.roughness, NoL, NoV, LoH2)" for part, function in functions.items() if part in parts]
         below = []
         if diffuse:
             below = [f"m.kd * {diffuse[0] if len(diffuse) == 1 else f'mix({diffuse[0]}, {diffuse[1]}, m.subsurface)'}"]
@@ -99,11 +111,13 @@ class Principled(Brdf):
         ]
         if "clearcoat" in parts:
             lines.append("c += facet * clearcoat(f, h, NoL, NoV, fh, m.clearcoat, m.clearcoat_gloss);")
-        dimmed = "(1.0 - m.metallic) * " * ("metal" in parts)
-        lines += [f"c += {dimmed}({' + '.join(below)});"] * bool(below)
+        if below:
+            dimmed = "(1.0 - m.metallic) * " if "metal" in parts else ""
+            lines.append(f"c += {dimmed}({' + '.join(below)});")
         arguments = "Principled m, Frame f, vec3 h, float NoL, float NoV, float LoH2, float fh, float facet"
-        text = "".join(f'#include "lobe/{name}.glsl"\n' for name in files) + f"\nvec3 principled_cos({arguments}) {{\n"
-        return {"lobes": text + "".join(f"    {line}\n" for line in [*lines, "return c;"]) + "}\n"}
+        body = "".join(f"    {line}\n" for line in [*lines, "return c;"])
+        text = f"\nvec3 principled_cos({arguments}) {{\n{body}}}\n"
+        return {"lobes": Slot(tuple(f"lobe/{name}.glsl" for name in files), text)}
 
     def asked(self, by: Literal["light", "ambient"]) -> frozenset[str]:
         parts = self._parts()
@@ -135,7 +149,7 @@ class Principled(Brdf):
         metallic = m.metallic[..., None]
 
         flat = flat_subsurface(m.roughness, NoL, NoV, LoH**2)
-        diffuse = (1 - m.subsurface) * burley(m.roughness, NoL, NoV, LoH**2) + m.subsurface * flat
+        diffuse = (1 - m.subsurface) * burley_diffuse(m.roughness, NoL, NoV, LoH**2) + m.subsurface * flat
         sheen = (m.sheen * fh * NoL)[..., None] * _mix(1.0, hue, m.sheen_tint[..., None])
         f0 = 0.08 * m.specular[..., None] * _mix(1.0, hue, m.specular_tint[..., None])
         f0 = _mix(f0, m.kd, metallic)
@@ -162,7 +176,7 @@ def _mix(a: Any, b: Any, t: Any) -> Any:
 
 
 def flat_subsurface(roughness: Array, NoL: Array, NoV: Array, LoH2: Array) -> Array:
-    """f cos (...) of reflectance 1, after Hanrahan and Krueger 1993; LoH2 = (l.h)^2."""
+    """Returns f cos (...) [1/sr] of the flat lobe with reflectance 1 (Hanrahan and Krueger 1993). LoH2 (...): (l.h)^2."""
     f90 = roughness * LoH2
     fss = (1 + (f90 - 1) * (1 - NoL) ** 5) * (1 + (f90 - 1) * (1 - NoV) ** 5)
     share = NoL / np.maximum(NoL + NoV, 1e-37)
@@ -170,7 +184,7 @@ def flat_subsurface(roughness: Array, NoL: Array, NoV: Array, LoH2: Array) -> Ar
 
 
 def gtr2(h: Array, roughness: Array, anisotropy: Array) -> Array:
-    """The distribution of the highlight's facets (...), [1/sr]; h (..., 3). Burley 2012, eqs. 8 and 13."""
+    """Returns the distribution (...) [1/sr] of the highlight's facets at half vectors h (..., 3) (Burley 2012, eqs. 8, 13)."""
     aspect = np.sqrt(1 - 0.9 * anisotropy)
     ax, ay = np.maximum(roughness**2 / aspect, LEAST_ALPHA), np.maximum(roughness**2 * aspect, LEAST_ALPHA)
     q = (h[..., 0] / ax) ** 2 + (h[..., 1] / ay) ** 2 + h[..., 2] ** 2
@@ -180,7 +194,7 @@ def gtr2(h: Array, roughness: Array, anisotropy: Array) -> Array:
 
 
 def gtr1(h: Array, a: Array) -> Array:
-    """The distribution of the coat's facets (...), [1/sr]; h (..., 3). Burley 2012, eq. 4 of appendix B."""
+    """Returns the distribution (...) [1/sr] of the coat's facets at half vectors h (..., 3) (Burley 2012, B, eq. 4)."""
     q = a**2 * h[..., 2] ** 2 + h[..., 0] ** 2 + h[..., 1] ** 2
     with np.errstate(divide="ignore"):
         result: Array = (1 - a**2) / (-math.pi * np.log(a**2) * q)
@@ -188,7 +202,7 @@ def gtr1(h: Array, a: Array) -> Array:
 
 
 def _shadowed(NoL: Array, NoV: Array, a: Any) -> Array:
-    """G / (4 n.l n.v) of Smith's separable shadowing for GGX of width a (...). Walter et al. 2007, eq. 34."""
+    """Returns G / (4 n.l n.v) (...), where G is Smith's separable shadowing for GGX of width a (...) (Walter 2007, eq. 34)."""
     one, other = (1 / (c + np.sqrt(a**2 * (1 - c**2) + c**2)) for c in (NoL, NoV))
     result: Array = one * other
     return result

@@ -1,6 +1,7 @@
-"""retro_phong: a cosine lobe about the direction that the light comes from."""
+"""retro_phong: a cosine lobe around the direction to the light."""
 
 import math
+from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 from glshade.brdfs import Array, Brdf, Colour, Limit, Parameter, Scalar, above_horizon, parameter
@@ -9,13 +10,20 @@ from glshade.brdfs.phong import power_of_cosine, without_lobe
 
 
 class RetroPhong(Brdf):
-    """(kd/pi + ks (p + 2)/(2 pi) max(l.v, 0)^p) n.l, p the exponent. Reflects ambient light with kd.
+    """(kd/pi + ks (p + 2)/(2 pi) max(l.v, 0)^p) n.l, where p is the exponent.
 
-    phong_normalised with the viewer on the other side of the normal: reciprocal, and as bright in all.
+    It is phong_normalised with the viewer mirrored at the normal, so it is reciprocal and has the same albedo. It reflects
+    ambient light with kd.
     """
 
     source: ClassVar[str] = "Lafortune et al. 1997 (lobe C = (1, 1, 1)); lecture slide 6"
     shares: ClassVar[tuple[str, ...]] = ("kd", "ks")
+    samples: ClassVar[tuple[Mapping[str, Any], ...]] = (
+        {"exponent": 1},
+        {"exponent": 4},
+        {"exponent": 16},
+        {"exponent": 64},
+    )
 
     brdf: Literal["retro_phong"] = "retro_phong"
     kd: Colour = parameter((0.3, 0.3, 0.3), Parameter("diffuse reflectance", base=True))

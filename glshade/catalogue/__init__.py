@@ -1,1 +1,1 @@
-"""Catalogue: what models, lights and presets declare, and figures of what they do with light."""
+"""Catalogue: lists what models, lights and presets declare, and plots how models reflect light."""

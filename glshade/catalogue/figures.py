@@ -1,7 +1,7 @@
-"""Plots: figures of materials, by matplotlib (`pip install 'glshade[plot]'`). The data behind them are in glshade/lobe.py.
+"""Figures: plots of materials by matplotlib, which `pip install 'glshade[plot]'` installs.
 
-`figure({"gold": material, ...}, kinds=["polar"])` gives a matplotlib Figure, `save(figure, path)` a file whose bytes are the
-same whenever it is made.
+`figure({"gold": material, ...}, kinds=["polar"])` returns a matplotlib Figure, and `save(figure, path)` writes it to a file.
+The same figure always gives the same bytes.
 """
 
 from __future__ import annotations
@@ -27,13 +27,15 @@ if TYPE_CHECKING:
     from glshade.catalogue.sheet import Scale as Scale
     from glshade.gl.renderer import Renderer
 
+# The suffixes of the files that figures can be written to.
 SUFFIXES = (".pdf", ".png", ".svg")
+# The default angles of incidence of slices, and of solid lobes [rad].
 ANGLES = tuple(float(angle) for angle in np.radians((0.0, 30.0, 60.0, 80.0)))
 INCIDENCE = float(np.radians(45.0))
 
 
 def check() -> None:
-    """Errors: MissingLibrary."""
+    """Checks that matplotlib is installed. Errors: MissingLibrary."""
     try:
         import matplotlib  # noqa: F401
     except ImportError:
@@ -41,7 +43,7 @@ def check() -> None:
 
 
 def check_suffix(path: Path) -> None:
-    """Errors: GlshadeError where the extension names no format that figures are written in."""
+    """Checks that figures can be written to files with the suffix of `path`. Errors: GlshadeError."""
     if path.suffix.lower() not in SUFFIXES:
         raise GlshadeError(
             f"{path}: cannot write a figure as {path.suffix or 'a file without extension'}; allowed: {', '.join(SUFFIXES)}"
@@ -59,11 +61,17 @@ def figure(
     scale: Scale = "auto",
     renderer: Renderer | None = None,
 ) -> Figure:
-    """A sheet of panels, one or more a kind; materials (label -> material, none of them textured) are laid over each other.
+    """Returns a figure with one or more panels for each kind.
 
-    angles: of incidence, of the slices; incidence: of the solid lobes; azimuth: of the plane of incidence to the tangent; all
-    in radians. scale: of slices and lobes; auto: by the log where a linear scale would hide curves. renderer: left out, one is
-    made for the call if a kind is drawn by it. Errors: MissingLibrary, ValueError for a texture, ContextError.
+    materials: label -> material without textures; the curves of several materials share a panel.
+    kinds: the kinds of panels.
+    angles: the angles of incidence of the slices [rad].
+    incidence: the angle of incidence of the solid lobes [rad].
+    azimuth: the angle between the plane of incidence and the tangent [rad].
+    quantity: the quantity that slices and lobes show.
+    scale: the scale of slices and lobes; "auto" is logarithmic for slices if a linear scale would hide some of the curves.
+    renderer: optional, the Renderer that draws spheres and lobes; by default, one is made if the figure has any.
+    Errors: MissingLibrary, ContextError, ValueError for a textured material.
     """
     check()
     from glshade.catalogue.sheet import Sheet
@@ -77,8 +85,9 @@ def figure(
 
 
 def save(figure: Figure, path: str | Path) -> None:
-    """Writes SVG, PNG or PDF, as the extension says. No time of day inside; the file appears whole or not at all.
+    """Writes a figure as SVG, PNG or PDF, as the suffix of `path` says.
 
+    The file holds no timestamp, so that its bytes depend on the figure alone. It appears whole or not at all.
     Errors: GlshadeError.
     """
     from matplotlib import style
@@ -96,8 +105,9 @@ def save(figure: Figure, path: str | Path) -> None:
     }
     suffix = path.suffix.lower()
     try:
-        # Not as the user's own style would have it: ticks are made now. Names of clip paths would be random without a salt.
-        with replacing(path) as beside, style.context(["default", STYLE, {"svg.hashsalt": "glshade"}]):
-            figure.savefig(beside, format=suffix[1:], metadata=metadata[suffix])
+        # Matplotlib lays out ticks only now. So the style is set again, or else the user's own style would apply to them.
+        # Without a salt, the names of clip paths in SVG would be random.
+        with replacing(path) as temporary, style.context(["default", STYLE, {"svg.hashsalt": "glshade"}]):
+            figure.savefig(temporary, format=suffix[1:], metadata=metadata[suffix])
     except OSError as error:
         raise GlshadeError(f"{path}: cannot be written: {error.strerror}") from None

@@ -1,4 +1,4 @@
-"""Listing: what models, lights and presets declare of themselves, as plain dictionaries. Their keys are an interface."""
+"""Listing: the declarations of models, lights and presets as plain dictionaries, whose keys are an interface for users."""
 
 from __future__ import annotations
 
@@ -11,18 +11,23 @@ from glshade.brdfs import BRDFS, Brdf, Law
 from glshade.lights import LIGHTS
 from glshade.presets import PRESETS
 
+# Law, a property that a model may promise -> its meaning in words
 LAWS: dict[Law, str] = {
-    "reciprocity": "f(l, v) = f(v, l): light may be turned round",
+    "reciprocity": "f(l, v) = f(v, l): light and viewer may be exchanged",
     "energy": "no more light leaves than arrives",
 }
 
 
 def brdf(name: str) -> dict[str, Any]:
-    """Everything a model declares. Errors: KeyError.
+    """Returns the declaration of a model as a dictionary ready for JSON, with these keys:
 
-    name, class, summary, description, source, anisotropic; parameters: name, type (colour or number), default (None where left
-    out), low, high, usual, unit, description, same_as, base; options: name, default, choices, description; laws: promised and
-    reason each; shares; isotropic_where; limits: says, one, other, within.
+    name, class, summary, description, source, anisotropic, shares, isotropic_where: as the class declares them.
+    parameters: a list of dictionaries with the keys name, type (colour or number), default (None for an optional parameter),
+        low, high, usual, unit, description, same_as and base.
+    options: a list of dictionaries with the keys name, default, choices and description.
+    laws: law -> `promised` and, if the model breaks the law, the reason.
+    limits: a list of dictionaries with the keys says, one, other and within.
+    Errors: KeyError if no model has this name.
     """
     model = BRDFS[name]
     return {
@@ -59,10 +64,14 @@ def brdf(name: str) -> dict[str, Any]:
 
 
 def light(name: str) -> dict[str, Any]:
-    """Everything a light declares. Errors: KeyError.
+    """Returns the declaration of a light as a dictionary ready for JSON, with these keys:
 
-    name, class, summary, description, omnidirectional; falloffs; keys of the scene file: name, default, required, takes (in
-    words), description; uniforms: the GLSL struct's fields in their order, name -> vec3 or float.
+    name, class, summary, description, omnidirectional: as the class declares them.
+    falloffs: the falloffs that the light may have; empty if it has none.
+    keys: a list with a dictionary for each key of the scene file: name, default, required, takes (the allowed values in words)
+        and description.
+    uniforms: name -> vec3 or float, the fields of the GLSL struct in their order.
+    Errors: KeyError if no light has this name.
     """
     model = LIGHTS[name]
     falloff = model.model_fields.get("falloff")
@@ -88,13 +97,20 @@ def light(name: str) -> dict[str, Any]:
 
 
 def preset(name: str) -> dict[str, Any]:
-    """name, description, source, brdf, material (as in a scene file), swatch (#rrggbb, sRGB). Errors: KeyError."""
-    found = PRESETS[name]
-    material = dict(found.material)
+    """Returns the declaration of a preset as a dictionary ready for JSON, with these keys:
+
+    name, description, source: as its file declares them.
+    brdf: the model's name.
+    material: the material's keys, as a scene file gives them.
+    swatch: the colour as #rrggbb, sRGB-encoded.
+    Errors: KeyError if no preset has this name.
+    """
+    declared = PRESETS[name]
+    material = dict(declared.material)
     return {
         "name": name,
-        "description": found.description,
-        "source": found.source,
+        "description": declared.description,
+        "source": declared.source,
         "brdf": material["brdf"],
         "material": _plain(material),
         "swatch": swatch(BRDFS[material["brdf"]].model_validate(material)),
@@ -102,27 +118,32 @@ def preset(name: str) -> dict[str, Any]:
 
 
 def swatch(material: Brdf) -> str:
-    """`#rrggbb`, sRGB: what the surface shows from straight above under a uniform white sky, its albedo at normal incidence."""
+    """Returns a material's albedo at normal incidence as `#rrggbb`, sRGB-encoded: its colour under a uniform white sky."""
     import numpy as np
 
-    from glshade.catalogue.albedo import albedo
+    from glshade.catalogue.albedo import directional_albedo
     from glshade.image.srgb import linear_to_srgb
 
-    # Half a code of eight bits.
-    colour = linear_to_srgb(albedo(material, (0.0, 0.0, 1.0), within=2e-3))
+    # An error of 2e-3, half a step between 8-bit codes, does not show.
+    colour = linear_to_srgb(directional_albedo(material, (0.0, 0.0, 1.0), within=2e-3))
     return "#" + "".join(f"{code:02x}" for code in np.rint(colour * 255).astype(int).tolist())
 
 
 def _described(model: type) -> dict[str, str]:
-    """class; summary, from the first line of its module, which starts with the name; description, its own docstring."""
-    own = inspect.cleandoc(model.__dict__.get("__doc__") or "")
+    """Returns the description that a class gives of itself, as a dictionary with these keys:
+
+    class: its name.
+    summary: the first line of its module's docstring after "Name: ", or the first line of its own docstring.
+    description: its own docstring.
+    """
+    description = inspect.cleandoc(model.__dict__.get("__doc__") or "")
     first = (sys.modules[model.__module__].__doc__ or "").strip().partition("\n")[0]
-    summary = first.partition(": ")[2] or own.partition("\n")[0]
-    return {"class": model.__name__, "summary": summary.rstrip("."), "description": own}
+    summary = first.partition(": ")[2] or description.partition("\n")[0]
+    return {"class": model.__name__, "summary": summary.rstrip("."), "description": description}
 
 
 def _material(material: Brdf) -> dict[str, Any]:
-    """As a scene file would have it: the model and what is said of it."""
+    """Returns a material as a table of a scene file: the model's name and the keys that were given."""
     return {
         "brdf": material.brdf,
         **{key: _plain(getattr(material, key)) for key in sorted(material.model_fields_set - {"brdf"})},
@@ -130,7 +151,7 @@ def _material(material: Brdf) -> dict[str, Any]:
 
 
 def _takes(schema: Mapping[str, Any]) -> str:
-    """What a key takes, in a few words."""
+    """Returns the values that a key takes, in words, from its JSON schema."""
     if "enum" in schema:
         return ", ".join(f'"{value}"' for value in schema["enum"])
     options = [option for option in schema.get("anyOf", ()) if option.get("type") != "null"]
@@ -138,7 +159,7 @@ def _takes(schema: Mapping[str, Any]) -> str:
         words = [_takes(option) for option in options]
         return "3 numbers or 1" if words == ["number", "3 numbers"] else " or ".join(words)
     if schema.get("type") == "array":
-        items = [*schema.get("prefixItems", ()), schema.get("items", {})][0]
+        items = schema["prefixItems"][0] if schema.get("prefixItems") else schema.get("items", {})
         return f"{schema['maxItems']} {_takes(items)}s" if "maxItems" in schema else f"list of {_takes(items)}s"
     signs = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
     bounds = [f"{sign} {schema[key]:g}" for key, sign in signs.items() if key in schema]
@@ -146,7 +167,7 @@ def _takes(schema: Mapping[str, Any]) -> str:
 
 
 def _plain(value: Any) -> Any:
-    """As JSON has it: lists for tuples, tables for models."""
+    """Returns a value in a form that JSON can hold: tuples become lists, pydantic models become dictionaries."""
     if isinstance(value, Mapping):
         return {key: _plain(item) for key, item in value.items()}
     if hasattr(value, "model_dump"):

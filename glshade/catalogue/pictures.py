@@ -1,4 +1,4 @@
-"""Pictures of materials: a lit sphere, a lobe as a solid, a sphere in a white furnace. Drawn by glshade, without matplotlib."""
+"""Pictures of materials, drawn without matplotlib: a lit sphere, a lobe as a solid, and a sphere in a white furnace."""
 
 from __future__ import annotations
 
@@ -13,31 +13,40 @@ from glshade.image.image import Image
 from glshade.image.srgb import linear_to_srgb
 from glshade.mesh.mesh import Mesh
 from glshade.scene.camera import Orthographic
-from glshade.scene.scene import Film, Object, Scene, Transform
+from glshade.scene.film import Film
+from glshade.scene.object import Object, Transform
+from glshade.scene.scene import Scene
 
 Array = NDArray[np.float64]
 Scale = Literal["linear", "log"]
 Kind = Literal["polar", "lobe", "sphere", "furnace", "albedo", "fresnel"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
-# Those that glshade draws itself, on the GPU.
+# The kinds of figures that a Renderer draws.
 DRAWN: frozenset[Kind] = frozenset({"lobe", "sphere"})
-# Those that are pictures, without axes.
+# The kinds of figures that are pictures without axes.
 PICTURES: frozenset[Kind] = DRAWN | {"furnace"}
 
-# A log scale shows this many decades below the largest value.
+# A logarithmic scale shows this many decades below the largest value.
 DECADES = 4
-# Half the width of the view of a lobe, whose largest radius is 1: arrows are longer.
+# Half the width of the view of a lobe, whose largest radius is 1. It leaves room for the arrows.
 REACH = 1.32
-# Of the lobe's arrows: length, and of lobes without a colour of their own (all linear Rec. 709).
+# The distance of the arrows' outer ends from the centre of a lobe.
 ARROW = 1.22
+# The colours of the arrows and of the surface [linear Rec. 709].
 LIGHT_COLOUR, NORMAL_COLOUR, DISC_COLOUR = (0.9, 0.42, 0.0), (0.12, 0.12, 0.13), (0.55, 0.56, 0.58)
+# The colour of lobes whose values have the same red, green and blue [linear Rec. 709].
 NEUTRAL = (0.10, 0.28, 0.60)
-# The sky of a furnace as it is shown: half of white, so that a sphere that gives back too much is seen as well.
+# The sky of a furnace is drawn at half of white, so that a sphere that reflects more light than it receives is visible too.
 SKY = 0.5
 
 
 def radii(height: Array, scale: Scale, most: float) -> Array:
-    """(N,) in [0, 1]: how far out values (N,) are drawn, `most` and more at 1; log: over DECADES decades."""
+    """Returns the radii (N,) in [0, 1] at which values (N,) are drawn.
+
+    height: (N,), the values.
+    scale: "linear", or "log" for a scale of DECADES decades below `most`.
+    most: the value that is drawn at radius 1; larger values are drawn at radius 1 too.
+    """
     if most <= 0:
         return np.zeros_like(height)
     share: Array = np.minimum(height / most, 1.0)
@@ -48,7 +57,7 @@ def radii(height: Array, scale: Scale, most: float) -> Array:
 
 
 def sphere(material: Brdf, size: int = 256) -> Scene:
-    """A sphere under one directional light from the upper left, seen from afar: the light that leaves from each point."""
+    """Returns a scene of a sphere under one directional light from the upper left, in a picture of size x size pixels."""
     return Scene.model_validate(
         {
             "description": f"A sphere of {material.brdf} under one directional light",
@@ -69,32 +78,39 @@ def solid(
     size: int = 400,
     neutral: tuple[float, float, float] = NEUTRAL,
 ) -> tuple[Scene, float]:
-    """(scene, largest value [1/sr]): the lobe of light from the left at `incidence` [radians], its largest value drawn at 1.
+    """Returns (scene, largest value [1/sr]): a lobe as a solid, whose distance from the centre shows the value.
 
-    An arrow is the light, another the normal, the disc is the surface. Each direction has the colour of what leaves there; a
-    lobe without colour is `neutral`.
+    The light comes from the left. One arrow shows the direction to the light, another the normal, and a disc shows the surface.
+    Each point of the lobe has the colour of the light that is reflected in its direction.
+
+    incidence: the angle of the light from the normal [rad].
+    azimuth: the angle between the plane of incidence and the tangent [rad].
+    quantity: the quantity that the lobe shows.
+    scale: the scale of the distance; the largest value has the distance 1.
+    size: the picture's width [pixels]; the height is three quarters of the width.
+    neutral: the colour of a lobe whose values have the same red, green and blue [linear Rec. 709].
     """
-    found = lobe.surface(material, incidence, azimuth, quantity)
-    height = found.values.max(axis=1)
-    endless = lobe.unbounded(material, incidence, azimuth)
-    most = lobe.drawn_height(np.arccos(found.directions[:, 2]), height, endless)
-    out = radii(height, scale, most)
-    # The light ends where the lobe begins.
+    mesh_of_lobe = lobe.surface(material, incidence, azimuth, quantity)
+    height = mesh_of_lobe.values.max(axis=1)
+    unbounded = lobe.unbounded(material, incidence, azimuth)
+    most = lobe.drawn_height(np.arccos(mesh_of_lobe.directions[:, 2]), height, unbounded)
+    radius = radii(height, scale, most)
+    # The arrow of the light ends just outside the lobe.
     to_light = lobe.direction(-incidence)
-    end = float(out[np.argmax(found.directions @ to_light)]) + 0.02
+    end = float(radius[np.argmax(mesh_of_lobe.directions @ to_light)]) + 0.02
     objects = [
-        # The surface, a hair below where the lobe stands.
+        # The disc lies slightly below the centre of the lobe, so that the disc hides no part of the lobe.
         _object("cylinder", DISC_COLOUR, scale=(1.0, 0.008, 1.0), translate=(0.0, -0.012, 0.0)),
         *_arrow(np.zeros(3), np.array([0.0, ARROW, 0.0]), NORMAL_COLOUR, 0.008),
         *_arrow(ARROW * _world(to_light), end * _world(to_light), LIGHT_COLOUR, 0.014),
     ]
     if most > 0:
-        coloured = bool(np.any(np.ptp(found.values, axis=1) > 1e-6 * most))
-        share = found.values / np.maximum(height, 1e-300)[:, None]
+        coloured = bool(np.any(np.ptp(mesh_of_lobe.values, axis=1) > 1e-6 * most))
+        share = mesh_of_lobe.values / np.maximum(height, 1e-300)[:, None]
         colours = share if coloured else np.broadcast_to(neutral, share.shape)
         rgba = np.column_stack([colours, np.ones(len(colours))])
-        vertices = _world(found.vertices(out))
-        mesh = Mesh.build(vertices, found.triangles, None, None, rgba)
+        vertices = _world(mesh_of_lobe.vertices(radius))
+        mesh = Mesh.build(vertices, mesh_of_lobe.triangles, None, None, rgba)
         material_of_lobe: Any = {"brdf": "lambert", "kd": 0.95}
         objects.append(Object(mesh=mesh, material=material_of_lobe, normals="smooth", threshold=180.0, sides="both"))
     lights: Any = [
@@ -113,7 +129,7 @@ def solid(
 
 
 def tips(incidence: float) -> dict[str, tuple[float, float]]:
-    """name -> (x, y) in the picture of a lobe, from 0 to 1 each, x to the right and y up: the ends of its arrows."""
+    """Returns name of an arrow -> (x, y) of its outer end in the picture of a lobe, from 0 to 1, x to the right and y up."""
     camera = _camera()
     view = camera.view(np.array([[-1.0, -1, -1], [1, 1, 1]]), 4 / 3)
     ends = {"l": ARROW * _world(lobe.direction(-incidence)), "n": np.array([0.0, ARROW, 0.0])}
@@ -125,65 +141,70 @@ def tips(incidence: float) -> dict[str, tuple[float, float]]:
 
 
 def furnace(material: Brdf, size: int = 256) -> tuple[Image, tuple[float, float]]:
-    """(picture, (least, largest) albedo): a sphere under a uniform sky that is shown as a grey of 0.5, linear.
+    """Returns (picture, (least, largest) albedo) of a sphere under a uniform sky, which is a linear grey of 0.5.
 
-    Darker than the sky: light is lost; brighter: more leaves than arrives.
+    The sphere is darker than the sky where it loses light, and brighter where it reflects more light than it receives.
     """
-    found, coverage = lobe.furnace(material, size)
+    albedo, coverage = lobe.furnace(material, size)
     c = coverage[..., None]
-    pixels = SKY * (c * found + (1 - c))
-    seen = found[coverage == 1]
-    return Image(pixels.astype(np.float32)), (float(seen.min()), float(seen.max()))
+    pixels = SKY * (c * albedo + (1 - c))
+    inside = albedo[coverage == 1]
+    return Image(pixels.astype(np.float32)), (float(inside.min()), float(inside.max()))
 
 
 def side_by_side(images: list[Image], background: tuple[float, float, float] = (1.0, 1.0, 1.0)) -> Image:
-    """The pictures in one row, float32 and opaque: where they are transparent, the background (linear Rec. 709)."""
-    rows = []
+    """Returns the pictures in one row, as float32 and opaque, over a background [linear Rec. 709]."""
+    columns = []
     for image in images:
         pixels = image.linear().pixels
         if image.channels == "RGBA":
             pixels = pixels[..., :3] + (1 - pixels[..., 3:]) * np.array(background, dtype=np.float32)
-        rows.append(pixels)
-    return Image(np.concatenate(rows, axis=1).astype(np.float32))
+        columns.append(pixels)
+    return Image(np.concatenate(columns, axis=1).astype(np.float32))
 
 
-def shown(colour: Array) -> tuple[float, float, float]:
-    """A linear Rec. 709 colour (3,) as matplotlib takes it: sRGB-encoded, 0 to 1."""
+def matplotlib_colour(colour: Array) -> tuple[float, float, float]:
+    """Returns a linear Rec. 709 colour (3,) in the form that matplotlib takes: sRGB-encoded, from 0 to 1."""
     r, g, b = (float(c) for c in linear_to_srgb(colour))
     return r, g, b
 
 
 def _camera() -> Orthographic:
-    # From the side of the plane of incidence, a little above the surface; the middle of the picture is above the surface too.
+    """Returns the camera of a lobe: it looks from beside the plane of incidence and slightly above the surface."""
+    # The target is above the surface, because the lower half of the picture would be empty otherwise.
     return Orthographic(eye=(0.5, 2.22, 5.0), target=(0.0, 0.52, 0.0), height=2 * REACH * 3 / 4)
 
 
 def _world(local: Array) -> Array:
-    """(..., 3): the local frame with its normal up: x stays, z is y, y goes back."""
+    """Returns vectors of the local frame (n = +z) in world space, where the normal is +y and x stays x.
+
+    local: (..., 3), with any leading shape. The result has the same shape.
+    """
     result: Array = local @ np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
     return result
 
 
 def _object(shape: str, colour: tuple[float, float, float], **transform: Any) -> Object:
+    """Returns a matte object. colour: linear Rec. 709. transform: the keys of a Transform."""
     material: Any = {"brdf": "lambert", "kd": colour}
     chosen: Any = shape
     return Object(shape=chosen, material=material, transform=Transform(**transform))
 
 
 def _arrow(start: Array, end: Array, colour: tuple[float, float, float], radius: float) -> list[Object]:
-    """A shaft and a head, from start to end."""
+    """Returns the shaft and the head of an arrow from start (3,) to end (3,). radius: that of the shaft."""
     length = float(np.linalg.norm(end - start))
     along = (end - start) / length
     across = np.cross(along, [0.0, 0.0, 1.0])
     across /= np.linalg.norm(across)
     axes = np.stack([across, along, np.cross(across, along)], axis=1)
     head = min(9 * radius, 0.8 * length)
-    # Both shapes reach from y = -1 to 1.
+    # Cylinders and cones reach from y = -1 to 1 and have a radius of 1.
     parts = (("cylinder", radius, 0.0, length - head), ("cone", 3.2 * radius, length - head, length))
     objects = []
-    for shape, wide, low, high in parts:
+    for shape, width, low, high in parts:
         matrix = np.eye(4)
-        matrix[:3, :3] = axes * [wide, (high - low) / 2, wide]
+        matrix[:3, :3] = axes * [width, (high - low) / 2, width]
         matrix[:3, 3] = start + along * (low + high) / 2
         objects.append(_object(shape, colour, matrix=tuple(map(tuple, matrix.tolist()))))
     return objects

@@ -1,4 +1,4 @@
-"""Sheet: panels of one or several materials on a matplotlib figure. One method a kind of panel."""
+"""Sheet: draws the panels of one or several materials on a matplotlib figure, with one method for each kind of panel."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from glshade.brdfs import Brdf
 from glshade.catalogue import lobe, pictures
-from glshade.catalogue.pictures import DECADES, Kind, shown
+from glshade.catalogue.pictures import DECADES, Kind, matplotlib_colour
 
 if TYPE_CHECKING:
     from glshade.gl.renderer import Renderer
@@ -25,12 +25,13 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Scale = Literal["auto", "linear", "log"]
 
-# Okabe and Ito 2008: told apart with any colour vision. Yellow is left out: it is too pale for a line on white.
+# The palette of Okabe and Ito 2008, whose colours people with any kind of colour vision can tell apart. Its yellow is left out,
+# because it is too pale on white.
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00", "#000000")
-# And beyond seven lines by the stroke.
+# The dash patterns of lines. When all colours of the palette are used up, they repeat with the next dash pattern.
 STROKES: tuple[Any, ...] = ("-", (0, (5, 2)), (0, (1, 1.5)), (0, (5, 1.5, 1, 1.5)))
-# Red, green and blue light (linear Rec. 709), dimmed to the same luminance of 0.12 or as near as blue can come, so that each is
-# a dark enough line on white; the stroke tells them apart as well.
+# The colours of the lines that show the three channels [linear Rec. 709]. All have a luminance of about 0.12, so that each is
+# dark enough on white. The lines differ in their dash patterns too.
 CHANNELS = (("red", (0.56, 0.0, 0.0)), ("green", (0.0, 0.17, 0.0)), ("blue", (0.03, 0.06, 0.85)))
 INK, FAINT = "#30343b", "#d5d8dd"
 STYLE: dict[str, Any] = {
@@ -59,17 +60,20 @@ STYLE: dict[str, Any] = {
     "figure.dpi": 150,
     "savefig.dpi": 150,
 }
-# Where the heights of curves differ more than this, the lowest would be lost on a linear scale: a fifth of the radius.
+# The scale "auto" is logarithmic if the highest curve is more than this many times as high as the lowest. On a linear scale the
+# lowest curve would then lie within the innermost fifth of the half disc.
 HIDDEN = 5
-# Said of a lobe that grows without bound towards the horizon.
+# This text is added to the label of a lobe that grows without bound towards the horizon.
 CUT = "; cut off there"
-# Margins for what stands round the axes [inches]: left, right, bottom, top.
+# The margins around the axes of a curve, a half disc and a picture, for ticks, labels and titles: left, right, bottom, top
+# [inches].
 CURVE, DISC = (0.62, 0.18, 0.6, 0.4), (0.15, 0.15, 0.4, 0.35)
 PICTURE, NAMED_PICTURE = (0.1, 0.1, 0.4, 0.4), (0.1, 0.1, 0.35, 0.5)
-# Panels in one row at most.
+# The largest number of panels in a row.
 ACROSS = 4
-# Of rendered pictures [pixels], a little more than a panel has.
+# The side of rendered pictures [pixels]. It is a little more than the side of a panel.
 SIDE = 420
+# kind -> the title of its panels
 NAMES: dict[Kind, str] = {
     "polar": "Light leaving in the plane of incidence",
     "lobe": "Lobe",
@@ -82,10 +86,14 @@ NAMES: dict[Kind, str] = {
 
 @dataclass(frozen=True)
 class Panel:
-    """draw(axes) fills it; width, height, and margins round the axes (left, right, bottom, top) [inches].
+    """A panel of a sheet.
 
-    matplotlib could find the margins by itself, but its layouts differ in the last bits from one time to the next, and with
-    them an SVG's bytes.
+    The margins are fixed: matplotlib's own layouts differ in the last bits from run to run, and the bytes of an SVG file would
+    differ too.
+
+    draw: a function that draws the panel into matplotlib's axes.
+    width, height: the size of the panel [inches].
+    margins: left, right, bottom, top, between the axes and the edges of the panel [inches].
     """
 
     draw: Callable[[Any], None]
@@ -96,7 +104,16 @@ class Panel:
 
 @dataclass
 class Sheet:
-    """What is plotted, and how; see `glshade.catalogue.figures.figure`."""
+    """The materials of a figure and how they are plotted.
+
+    materials: label -> material without textures.
+    angles: the angles of incidence of the slices [rad].
+    incidence: the angle of incidence of the solid lobes [rad].
+    azimuth: the angle between the plane of incidence and the tangent [rad].
+    quantity: the quantity that slices and lobes show.
+    scale: the scale of slices and lobes.
+    renderer: the Renderer that draws spheres and lobes; None if the figure has neither.
+    """
 
     materials: Mapping[str, Brdf]
     angles: tuple[float, ...]
@@ -105,39 +122,44 @@ class Sheet:
     quantity: lobe.Quantity
     scale: Scale
     renderer: Renderer | None
+    # (label, angle) -> (angles, luminance), as `slice` returns them.
     _slices: dict[tuple[str, float], tuple[Array, Array]] = field(default_factory=dict)
 
     @property
     def single(self) -> bool:
+        """Whether the sheet shows a single material. If so, its panels tell angles and channels apart by colour."""
         return len(self.materials) == 1
 
     @property
     def unit(self) -> str:
-        """The label of an axis of the quantity."""
+        """The quantity and its unit, as the label of an axis."""
         return r"$f\,\cos\theta_l$  [1/sr]" if self.quantity == "f cos" else "$f$  [1/sr]"
 
     def colour(self, label: str) -> str:
+        """Returns the colour of a material's lines."""
         return PALETTE[list(self.materials).index(label) % len(PALETTE)]
 
     def stroke(self, label: str) -> Any:
+        """Returns the dash pattern of a material's lines."""
         return STROKES[list(self.materials).index(label) // len(PALETTE) % len(STROKES)]
 
     def figure(self, kinds: Sequence[Kind]) -> Figure:
+        """Returns the figure, with the panels of these kinds under the name of the material or a legend."""
         with matplotlib.style.context(["default", STYLE]):
             rows = self._rows(kinds)
             width = max(max(sum(panel.width for panel in row) for row in rows), 4.2)
             heights = [max(panel.height for panel in row) for row in rows]
             across = max(1, int(width / 2.4))
-            # The name or the legend, above all.
+            # The height of the name or the legend above all panels [inches].
             head = 0.4 if self.single else 0.2 + 0.22 * math.ceil(len(self.materials) / across)
             height = sum(heights) + head
             result = Figure(figsize=(width, height), facecolor="white")
             middle = (0.5, 1 - 0.5 * head / height)
             if self.single:
-                result.text(*middle, _said(next(iter(self.materials))), ha="center", va="center", fontsize=12, color=INK)
+                result.text(*middle, _escaped(next(iter(self.materials))), ha="center", va="center", fontsize=12, color=INK)
             else:
                 handles = [
-                    Line2D([], [], color=self.colour(label), linestyle=self.stroke(label), label=_said(label))
+                    Line2D([], [], color=self.colour(label), linestyle=self.stroke(label), label=_escaped(label))
                     for label in self.materials
                 ]
                 ncols = min(across, len(handles))
@@ -145,7 +167,7 @@ class Sheet:
             y = height - head
             for row, row_height in zip(rows, heights, strict=True):
                 y -= row_height
-                # A short row stands in the middle.
+                # Rows are centred.
                 x = (width - sum(panel.width for panel in row)) / 2
                 for panel in row:
                     left, right, bottom, top = panel.margins
@@ -155,30 +177,32 @@ class Sheet:
             return result
 
     def _rows(self, kinds: Sequence[Kind]) -> list[list[Panel]]:
+        """Returns the panels of these kinds in rows, from top to bottom."""
         panels: dict[Kind, list[Panel]] = {kind: getattr(self, f"_{kind}_panels")() for kind in dict.fromkeys(kinds)}
         if self.single:
-            # All there is of one material on one sheet.
+            # The panels of a single material fit into two rows.
             groups = [("polar", "lobe"), ("sphere", "furnace", "albedo", "fresnel")]
             rows = [[panel for kind in group for panel in panels.get(kind, ())] for group in groups]  # type: ignore[call-overload]
         else:
             curves = [*panels.pop("albedo", ()), *panels.pop("fresnel", ())]
-            rows = [row for found in panels.values() for row in _wrapped(found)] + [curves]
+            rows = [*(row for kind_panels in panels.values() for row in _wrapped(kind_panels)), curves]
         rows = [row for row in rows if row]
         if not rows:
-            # Fresnel alone was asked for, of models without it.
-            rows = [[Panel(_nothing, 4.2, 2.0, CURVE)]]
+            # Only Fresnel curves were asked for, and no material has any.
+            rows = [[Panel(_no_fresnel, 4.2, 2.0, CURVE)]]
         return rows
 
     # --- slices ---------------------------------------------------------------------------------------------------------
 
     def slice(self, label: str, angle: float) -> tuple[Array, Array]:
-        """(angles, luminance): a slice of one material."""
+        """Returns (angles (N,) [rad], luminance (N,)) of a material's slice for light at `angle`. Slices are cached."""
         if (label, angle) not in self._slices:
-            angles, found = lobe.polar_slice(self.materials[label], angle, self.azimuth, self.quantity)
-            self._slices[label, angle] = angles, found @ lobe.LUMINANCE
+            angles, values = lobe.polar_slice(self.materials[label], angle, self.azimuth, self.quantity)
+            self._slices[label, angle] = angles, values @ lobe.LUMINANCE
         return self._slices[label, angle]
 
     def _peak(self, label: str, angle: float) -> float:
+        """Returns the largest luminance of a slice that the scale has to hold."""
         return lobe.drawn_height(*self.slice(label, angle), lobe.unbounded(self.materials[label], angle, self.azimuth))
 
     def _polar_panels(self) -> list[Panel]:
@@ -204,13 +228,18 @@ class Sheet:
         ]
 
     def _polar(self, incidences: Sequence[float], log: bool, most: float, axes: Any) -> None:
-        """A half disc; matplotlib's own polar axes leave room for the other half."""
+        """Draws slices on a half disc. Matplotlib's own polar axes are not used: they would leave room for a whole disc.
+
+        incidences: the angles of incidence [rad].
+        log: True for a logarithmic scale.
+        most: the largest value that the disc has to hold.
+        """
         most = most or 1.0
         if log:
             rim = 1.2 * most
             top = math.floor(math.log10(rim))
             places = [(1 + (power - math.log10(rim)) / DECADES, power) for power in range(top, top - DECADES, -1)]
-            # A label at the middle would stand on its twin of the other side.
+            # Each circle has a label on both sides. On the smallest circles the two would overlap, so these have no labels.
             ticks = [(radius, f"$10^{{{power}}}$") for radius, power in places if radius > 0.08]
         else:
             rim = 1.04 * most
@@ -233,8 +262,8 @@ class Sheet:
                 )
         axes.set_title(NAMES["polar"] if self.single else f"Light at {_degrees(incidences[0])}")
         scale = f", log over {DECADES} decades" if log else ""
-        endless = any(lobe.unbounded(material, i, self.azimuth) for material in self.materials.values() for i in incidences)
-        scale += CUT if endless else ""
+        unbounded = any(lobe.unbounded(material, i, self.azimuth) for material in self.materials.values() for i in incidences)
+        scale += CUT if unbounded else ""
         axes.set_xlabel(f"luminance of {self.unit}{scale}", labelpad=2)
         if self.single:
             axes.legend(title="light at", loc="upper right", bbox_to_anchor=(1.02, 1.0), title_fontsize=8)
@@ -308,7 +337,7 @@ class Sheet:
         if self.single:
             axes.set_title(NAMES[kind])
         else:
-            axes.set_title(f"{NAMES[kind]}\n{_said(label)}", color=self.colour(label), fontsize=9)
+            axes.set_title(f"{NAMES[kind]}\n{_escaped(label)}", color=self.colour(label), fontsize=9)
         axes.set_xlabel(note, fontsize=8)
 
     # --- curves ---------------------------------------------------------------------------------------------------------
@@ -319,13 +348,13 @@ class Sheet:
     def _albedo(self, axes: Any) -> None:
         highest = 1.0
         for label, material in self.materials.items():
-            angles, found = lobe.albedo_curve(material, self.azimuth)
-            self._curve(axes, label, angles, found, self.stroke(label))
-            highest = max(highest, float(found.max()))
+            angles, albedos = lobe.albedo_curve(material, self.azimuth)
+            self._curve(axes, label, angles, albedos, self.stroke(label))
+            highest = max(highest, float(albedos.max()))
         axes.axhline(1.0, color=INK, linewidth=0.8, linestyle=(0, (2, 2)))
         axes.annotate("all that arrives", (0, 1), xytext=(2, 2), textcoords="offset points", fontsize=7, color=INK)
         self._angle_axis(axes, r"viewer's angle $\theta_v$  [degrees]")
-        # A diverging curve would flatten all others.
+        # The axis ends at 3, because a diverging curve would flatten all others.
         axes.set_ylim(0, min(1.08 * highest, 3.0) if highest > 1.04 else 1.08)
         axes.set_ylabel("directional albedo  [1]" + ("" if self.single else ", luminance"))
         axes.set_title(NAMES["albedo"])
@@ -340,8 +369,8 @@ class Sheet:
 
     def _fresnel(self, curves: Mapping[str, tuple[lobe.FresnelCurve, ...]], axes: Any) -> None:
         kinds = set()
-        for label, found in curves.items():
-            for curve in found:
+        for label, own in curves.items():
+            for curve in own:
                 kinds.add(curve.kind)
                 self._curve(
                     axes, label, curve.angles, curve.reflectance, "-" if curve.kind == "exact" else STROKES[2], curve.kind
@@ -355,15 +384,30 @@ class Sheet:
         handles = [Line2D([], [], color=INK, linestyle=strokes[kind], label=words[kind]) for kind in sorted(kinds)]
         axes.legend(handles=handles, loc="best")
 
-    def _curve(self, axes: Any, label: str, angles: Array, found: Array, stroke: Any, kind: str = "") -> None:
-        """One line, or one for each channel where a single material has a colour."""
+    def _curve(self, axes: Any, label: str, angles: Array, values: Array, stroke: Any, kind: str = "") -> None:
+        """Draws a curve over angles in degrees.
+
+        If the sheet shows a single material and it is coloured, the curve is one line for each channel. Otherwise it is one
+        line that shows the luminance.
+
+        angles: (N,) [rad].
+        values: (N, 3).
+        stroke: the dash pattern.
+        kind: the formula of a Fresnel curve; such curves have no legend of channels.
+        """
         degrees = np.degrees(angles)
-        if self.single and np.ptp(found, axis=1).max() > 1e-4:
+        if self.single and np.ptp(values, axis=1).max() > 1e-4:
             for index, (name, colour) in enumerate(CHANNELS):
                 line = STROKES[(0, 1, 3)[index]] if not kind else stroke
-                axes.plot(degrees, found[:, index], color=shown(np.array(colour)), linestyle=line, label=None if kind else name)
+                axes.plot(
+                    degrees,
+                    values[:, index],
+                    color=matplotlib_colour(np.array(colour)),
+                    linestyle=line,
+                    label=None if kind else name,
+                )
         else:
-            axes.plot(degrees, found @ lobe.LUMINANCE, color=self.colour(label), linestyle=stroke)
+            axes.plot(degrees, values @ lobe.LUMINANCE, color=self.colour(label), linestyle=stroke)
 
     def _angle_axis(self, axes: Any, label: str) -> None:
         axes.set_xlim(0, 90)
@@ -372,7 +416,7 @@ class Sheet:
 
 
 def _half_disc(axes: Any, ticks: Sequence[tuple[float, str]]) -> None:
-    """The grid of a polar plot of radius 1 above the ground: ticks are (radius, label)."""
+    """Draws the grid of a half disc of radius 1. ticks: (radius, label) of each circle."""
     _bare(axes)
     axes.set_aspect("equal")
     axes.set_xlim(-1.14, 1.14)
@@ -399,7 +443,7 @@ def _half_disc(axes: Any, ticks: Sequence[tuple[float, str]]) -> None:
 
 
 def _bare(axes: Any) -> None:
-    """Without axes, but with what is written about them."""
+    """Hides the ticks, grid and frame of the axes; titles and labels stay."""
     axes.set_xticks([])
     axes.set_yticks([])
     axes.grid(False)
@@ -407,29 +451,31 @@ def _bare(axes: Any) -> None:
         spine.set_visible(False)
 
 
-def _nothing(axes: Any) -> None:
+def _no_fresnel(axes: Any) -> None:
+    """Draws a note in place of a panel without curves."""
     axes.set_axis_off()
     axes.text(0.5, 0.5, "no Fresnel term among the parameters", ha="center", va="center", transform=axes.transAxes)
 
 
 def _wrapped(panels: list[Panel]) -> list[list[Panel]]:
-    """In rows of about one length."""
+    """Returns the panels in rows of about the same length, each of ACROSS panels at most."""
     count = math.ceil(len(panels) / ACROSS)
     across = math.ceil(len(panels) / count) if count else 1
     return [panels[start : start + across] for start in range(0, len(panels), across)]
 
 
-def _said(label: str) -> str:
-    """A name is no formula."""
+def _escaped(label: str) -> str:
+    """Returns a label that matplotlib does not take for a formula between dollar signs."""
     return label.replace("$", r"\$")
 
 
 def _degrees(angle: float) -> str:
+    """Returns an angle [rad] as text in degrees."""
     return f"{round(float(np.degrees(angle)), 2):g}°"
 
 
 def _linear(colour: str) -> Array:
-    """Linear Rec. 709 of a colour as matplotlib names it."""
+    """Returns a colour of matplotlib as linear Rec. 709 (3,)."""
     from matplotlib.colors import to_rgb
 
     from glshade.image.srgb import srgb_to_linear

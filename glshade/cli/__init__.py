@@ -1,4 +1,4 @@
-"""The command line: one module a command, found by its presence. The table of exit codes is in docs/exit-codes.md."""
+"""The command line: each module without a leading underscore is a command. docs/exit-codes.md lists the exit codes."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ import click
 from glshade.errors import GlshadeError
 from glshade.version import __version__
 
-# pydantic would read the metadata of every installed package, to look for plug-ins of its own: 20 to 50 ms.
+# Without this, pydantic reads the metadata of every installed package to look for plug-ins, which takes 20 to 50 ms.
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 COMMANDS = tuple(sorted(path.stem for path in Path(__file__).parent.glob("*.py") if not path.stem.startswith("_")))
+# Exit code after Ctrl-C: 128 plus the number of SIGINT, as in shells.
 INTERRUPTED = 130
 
 
 class Commands(click.Group):
-    """Loads a command when it is called for: `glshade render` pays for nothing but rendering."""
+    """Imports a command's module only when the command is run, so that each command imports only what it needs."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         return list(COMMANDS)
@@ -42,7 +43,7 @@ class Commands(click.Group):
             sys.stdout.flush()
             return result
         except BrokenPipeError:
-            # Nothing more to say, nor to flush at exit. click would exit with 1.
+            # The reader of stdout has gone. This is not an error, but click would exit with code 1.
             silence()
             return 0
 
@@ -57,7 +58,7 @@ class Commands(click.Group):
 
 
 def silence() -> None:
-    """Whoever read stdout has closed it (`| head`): what is still written goes nowhere."""
+    """Redirects stdout to /dev/null. For use after the reader of stdout has closed it, as in `| head`."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
@@ -68,9 +69,10 @@ def cli() -> None:
 
 
 def main() -> None:
-    """The `glshade` command, to the end of its process.
+    """Runs the `glshade` command and ends the process.
 
-    The operating system takes memory back at once; taking interpreter and driver apart first would take 0.1 s.
+    The process ends without the shutdown of interpreter and driver, which would take 0.1 s. The operating system frees the
+    memory faster.
     """
     try:
         run()
@@ -84,9 +86,9 @@ def main() -> None:
 
 
 def run() -> NoReturn:
-    """Does what the command line says and raises SystemExit, with an exit code of the table.
+    """Runs the command line, and raises SystemExit with an exit code of docs/exit-codes.md.
 
-    Every error that is known is one line a fault on stderr.
+    Known errors are printed to stderr, one line for each fault.
     """
     warnings.showwarning = lambda message, *_: click.echo(f"glshade: warning: {message}", err=True)
     try:

@@ -1,4 +1,4 @@
-"""Progress of a batch: a bar on a terminal, plain lines elsewhere, or events as JSON."""
+"""Progress: displays the progress of a batch, as a bar on a terminal, as plain lines elsewhere, or as events in JSON."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from glshade.cli import silence
 if TYPE_CHECKING:
     from rich.progress import TaskID
 
+    from glshade.batch.engine import Outcome
     from glshade.batch.record import Record
-    from glshade.batch.run import Outcome
     from glshade.batch.task import Task
 
-# Pictures that failed and are named in the last line.
+# Largest number of failed pictures that the last line names.
 NAMED = 3
 
 
 class Plain:
-    """The path of every picture that is made, on stdout; faults and warnings on stderr, each once."""
+    """Prints the path of every picture that is made to stdout, and each error and warning once to stderr."""
 
     def __init__(self, manifest: str | None = None) -> None:
         self._manifest = manifest
-        self._said: set[str] = set()
+        self._printed: set[str] = set()
         self._failed: list[str] = []
 
     def begin(self, pictures: int, jobs: int, driver: str) -> None:
-        """Nothing to say."""
+        """Prints nothing."""
 
     def picture(self, task: Task, record: Record) -> None:
-        """Its path, or its fault."""
+        """Prints the warnings of a picture, and its path or its error."""
         for text in record.warnings:
             self.warn(text)
         if record.state == "done":
@@ -43,48 +43,46 @@ class Plain:
             self._once(record.error)
 
     def path(self, output: str) -> None:
-        """A picture that is made."""
+        """Prints the path of a picture that is made."""
         self._print(output)
 
     def warn(self, text: str) -> None:
-        """A warning, once."""
+        """Prints a warning, unless it was printed before."""
         self._once(f"warning: {text}")
 
     def end(self, outcome: Outcome) -> None:
-        """What failed and what is left, of several pictures."""
+        """Prints which of several pictures failed, and how many were not begun."""
         if outcome.pictures == 1 or outcome.done + outcome.skipped == outcome.pictures:
             return
-        words = []
         if outcome.failed:
-            names = ", ".join(self._failed[:NAMED]) + ", ..." * (len(self._failed) > NAMED)
-            words.append(f"{outcome.failed} of {outcome.pictures} pictures failed: {names}")
+            names = [*self._failed[:NAMED], "..."] if len(self._failed) > NAMED else self._failed
+            self.say(f"{outcome.failed} of {outcome.pictures} pictures failed: {', '.join(names)}")
         if outcome.left:
-            words.append(f"{outcome.left} of {outcome.pictures} pictures are not made: --resume goes on")
-        for text in words:
-            self.say(text)
+            self.say(f"{outcome.left} of {outcome.pictures} pictures were not begun: continue with --resume")
         if outcome.failed and self._manifest:
-            self.say(f"{self._manifest} says why")
+            self.say(f"{self._manifest} holds the reasons")
 
     def say(self, text: str) -> None:
-        """A line for people."""
+        """Prints a line for the user to stderr."""
         click.echo(f"glshade: {text}", err=True)
 
     def _print(self, line: str) -> None:
-        """On stdout; once its reader has gone the pictures are made all the same."""
+        """Prints a line to stdout. If the reader of stdout has gone, the pictures are made all the same."""
         try:
             click.echo(line)
         except BrokenPipeError:
             silence()
 
     def _once(self, text: str) -> None:
-        if text not in self._said:
-            self._said.add(text)
+        """Prints a text of one or more lines to stderr, unless it was printed before."""
+        if text not in self._printed:
+            self._printed.add(text)
             for line in text.splitlines():
                 self.say(line)
 
 
 class Bar(Plain):
-    """A bar on the terminal. Paths go to stdout only where that is read by something else."""
+    """Shows a bar on the terminal. Paths are printed only if stdout is not a terminal, because they would break the bar."""
 
     def __init__(self, manifest: str | None = None) -> None:
         super().__init__(manifest)
@@ -102,53 +100,53 @@ class Bar(Plain):
         self._task: TaskID | None = None
 
     def begin(self, pictures: int, jobs: int, driver: str) -> None:
-        """An empty bar, and who fills it."""
+        """Shows an empty bar, below the driver and the number of jobs."""
         self._bar.start()
-        self._bar.console.print(f"{driver}, {jobs} job{'s' * (jobs > 1)}", style="dim", highlight=False)
+        self._bar.console.print(f"{driver}, {jobs} job{'s' if jobs > 1 else ''}", style="dim", highlight=False)
         self._task = self._bar.add_task("", total=pictures, rate="", current="")
 
     def picture(self, task: Task, record: Record) -> None:
-        """One step on."""
+        """Advances the bar by one picture, and shows its path there."""
         super().picture(task, record)
         if self._task is not None:
             speed = self._bar.tasks[0].speed
             self._bar.update(self._task, advance=1, rate=f"{speed:.1f}/s" if speed else "", current=record.output)
 
     def path(self, output: str) -> None:
-        """The bar names it."""
+        """Prints the path if stdout is not a terminal. The bar shows it in any case."""
         if not sys.stdout.isatty():
             self._print(output)
 
     def say(self, text: str) -> None:
-        """Above the bar."""
+        """Prints a line above the bar."""
         self._bar.console.print(f"glshade: {text}", highlight=False, markup=False, soft_wrap=True)
 
     def end(self, outcome: Outcome) -> None:
-        """The bar stays as it is."""
+        """Stops the bar and leaves it on the terminal."""
         self._bar.stop()
         super().end(outcome)
 
 
 class Json(Plain):
-    """Every event as one JSON object a line, on stdout; for people, stderr says what it says without."""
+    """Prints every event to stdout, one JSON object a line. stderr has the same lines as without --json."""
 
     def begin(self, pictures: int, jobs: int, driver: str) -> None:
-        """How much there is, and what makes it."""
+        """Prints the number of pictures, the number of jobs and the driver."""
         self._event("begin", {"pictures": pictures, "jobs": jobs, "driver": driver})
 
     def picture(self, task: Task, record: Record) -> None:
-        """The record, with what it was asked."""
+        """Prints the record, with the scene, frame and camera of its task."""
         super().picture(task, record)
-        asked: dict[str, Any] = {"scene": task.scene, "frame": task.frame, "camera": task.camera}
-        asked = {key: value for key, value in asked.items() if value is not None}
-        made = record.as_dict()
-        self._event(made.pop("state"), asked | made)
+        given: dict[str, Any] = {"scene": task.scene, "frame": task.frame, "camera": task.camera}
+        given = {key: value for key, value in given.items() if value is not None}
+        result = record.as_dict()
+        self._event(result.pop("state"), given | result)
 
     def path(self, output: str) -> None:
-        """The event has it."""
+        """Prints nothing, because the event holds the path."""
 
     def end(self, outcome: Outcome) -> None:
-        """The sums."""
+        """Prints the numbers of pictures and the times."""
         super().end(outcome)
         counts = {name: getattr(outcome, name) for name in ("done", "skipped", "failed", "left")}
         seconds = {"seconds": outcome.seconds, "seconds_pictures": outcome.seconds_pictures}
@@ -159,7 +157,12 @@ class Json(Plain):
 
 
 def progress(as_json: bool, several: bool, manifest: str | None) -> Plain:
-    """The one that fits who looks."""
+    """Returns the display for a batch.
+
+    as_json: True prints events as JSON
+    several: True if there is more than one picture, for which a terminal shows a bar
+    manifest: path of the manifest, which is printed after failures; None if there is no manifest
+    """
     if as_json:
         return Json(manifest)
     return Bar(manifest) if several and sys.stderr.isatty() else Plain(manifest)

@@ -1,4 +1,4 @@
-"""Tables and texts of the listings: by rich on a terminal, else plain columns that other programs can read."""
+"""Tables: prints rows and texts of commands, formatted by rich on a terminal, and elsewhere as plain text for programs."""
 
 from __future__ import annotations
 
@@ -8,17 +8,23 @@ from typing import Any
 
 import click
 
-# A cell: its text, or (text, rich style).
+# A cell of a table: its text, or (text, style of rich).
 Cell = str | tuple[str, str]
 
 
 def on_terminal() -> bool:
-    """Whether a person looks."""
+    """Returns whether stdout is a terminal."""
     return sys.stdout.isatty()
 
 
 def chosen(names: Sequence[str], known: Mapping[str, Any], what: str) -> list[str]:
-    """The names, or all there are. Errors: click.BadParameter with the nearest name."""
+    """Returns the given names, or all known names if no name is given.
+
+    names: names from the command line
+    known: the known names, as keys
+    what: noun for the error message, such as "model"
+    Errors: click.BadParameter for an unknown name, with the nearest known one.
+    """
     from glshade.document import nearest
 
     for name in names:
@@ -27,14 +33,15 @@ def chosen(names: Sequence[str], known: Mapping[str, Any], what: str) -> list[st
     return list(names) or list(known)
 
 
-def as_json(found: Any) -> None:
+def as_json(value: Any) -> None:
+    """Prints a value as indented JSON."""
     import json
 
-    click.echo(json.dumps(found, indent=2, ensure_ascii=False, allow_nan=False))
+    click.echo(json.dumps(value, indent=2, ensure_ascii=False, allow_nan=False))
 
 
 def table(heads: Sequence[str], rows: Sequence[Sequence[Cell]]) -> None:
-    """One row a thing."""
+    """Prints a table with these headings and rows."""
     if on_terminal():
         _rich_table(heads, rows)
         return
@@ -52,7 +59,7 @@ def _rich_table(heads: Sequence[str], rows: Sequence[Sequence[Cell]]) -> None:
 
     result = Table(box=box.SIMPLE_HEAD, header_style="bold", pad_edge=False)
     for index, head in enumerate(heads):
-        # The name, and what is short, stays in one piece.
+        # The first column holds names, which must not be wrapped.
         result.add_column(head, style="cyan" if index == 0 else None, no_wrap=index == 0)
     for row in rows:
         result.add_row(*(Text(cell) if isinstance(cell, str) else Text(cell[0], style=cell[1]) for cell in row))
@@ -60,23 +67,25 @@ def _rich_table(heads: Sequence[str], rows: Sequence[Sequence[Cell]]) -> None:
 
 
 def title(text: str, beside: str = "") -> None:
+    """Prints a bold title, with a plain text beside it."""
     click.echo(click.style(text, bold=True) + (f"  {beside}" if beside else ""))
 
 
 def paragraph(text: str, label: str = "") -> None:
-    """Wrapped to the terminal, and left as it is elsewhere."""
+    """Prints a text after its label. On a terminal it is wrapped to the width; elsewhere it stays on one line."""
     text = f"{label}: {text}" if label else text
     click.echo(click.wrap_text(text, width=_width(), preserve_paragraphs=True) if on_terminal() else text)
 
 
 def _width() -> int:
+    """Returns the width of the terminal [columns], at most 128, because longer lines are hard to read."""
     import shutil
 
     return min(shutil.get_terminal_size().columns, 128)
 
 
 def each(names: Sequence[str], show: Callable[[str], None]) -> None:
-    """One after the other, an empty line between."""
+    """Calls `show` with each name, and prints an empty line between."""
     for index, name in enumerate(names):
         if index:
             click.echo()
@@ -84,7 +93,7 @@ def each(names: Sequence[str], show: Callable[[str], None]) -> None:
 
 
 def value(given: Any) -> str:
-    """A default, short: one number for three equal ones, - for what may be left out."""
+    """Returns a default value as short text: one number for three equal numbers, and "-" for None (an optional value)."""
     if given is None:
         return "-"
     if isinstance(given, list):

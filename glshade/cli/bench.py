@@ -1,4 +1,4 @@
-"""glshade bench: what things cost on the driver at hand. One subcommand a function of this module."""
+"""Command `glshade bench`: measures the speed of glshade on the driver at hand. Each subcommand is a function here."""
 
 from __future__ import annotations
 
@@ -7,14 +7,17 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-if TYPE_CHECKING:
-    from glshade.bench.report import Report
+from glshade.cli._options import driver, models, shaders
 
+if TYPE_CHECKING:
+    from glshade.bench.report import BenchReport
+
+# Further names that `work` takes: they stand for measurements of glshade alone.
 MEASURED_BESIDE = ("growth", "jobs")
 
 
 class Bench(click.Group):
-    """A group whose `work` may go without saying: `glshade bench W1`, `glshade bench --json`."""
+    """A command group whose default subcommand is `work`, as in `glshade bench W1` and `glshade bench --json`."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         if not args or args[0] not in (*self.commands, *ctx.help_option_names):
@@ -24,56 +27,65 @@ class Bench(click.Group):
 
 @click.group(cls=Bench)
 def command() -> None:
-    """Measures what things cost on this driver, by the clock on the wall.
+    """Measures the speed of glshade.
 
-    `glshade bench` alone, or with names such as W1, is `glshade bench work`: the same pictures drawn by glshade and by other
-    programs.
+    All times are wall-clock times on the driver at hand. The default subcommand is `work`, which draws the same
+    pictures by glshade and by other programs: `glshade bench W1` is `glshade bench work W1`.
     """
 
 
 @command.command()
 @click.argument("names", metavar="[NAME]...", nargs=-1)
-@click.option("--peers", multiple=True, metavar="NAME", help="Only this peer, and moderngl by hand; repeatable.")
-@click.option("--repeat", type=click.IntRange(1, 1000), default=7, show_default=True, help="Rounds, each program once in each.")
-@click.option("--size", type=click.Choice(["full", "small"]), default="full", help="small: in a moment, to see that it works.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout, for keeping.")
-@click.option("--markdown", "as_markdown", is_flag=True, help="The tables of docs/benchmarks.md on stdout.")
 @click.option(
-    "--save", type=click.Path(path_type=Path, dir_okay=False), help="Keeps the JSON object in a file, whatever is shown."
+    "--peers", multiple=True, metavar="NAME", help="Compares only with this peer, and with moderngl by hand; repeatable."
 )
+@click.option(
+    "--repeat",
+    type=click.IntRange(1, 1000),
+    default=7,
+    show_default=True,
+    help="Number of rounds; each program runs once in each.",
+)
+@click.option(
+    "--size", type=click.Choice(["full", "small"]), default="full", help="small: reduced works, to see that they run."
+)
+@click.option("--json", "as_json", is_flag=True, help="Prints the results as one JSON object.")
+@click.option("--markdown", "as_markdown", is_flag=True, help="Prints the tables of docs/benchmarks.md.")
+@click.option("--save", type=click.Path(path_type=Path, dir_okay=False), help="Also writes the JSON object to this file.")
 def work(
     names: tuple[str, ...], peers: tuple[str, ...], repeat: int, size: str, as_json: bool, as_markdown: bool, save: Path | None
 ) -> None:
-    """Times glshade beside other programs: each NAME, or all of them: W1 W2 W3 W3s W4 W5 growth jobs.
+    """Times glshade beside other programs at each NAME, or at all of W1 W2 W3 W3s W4 W5 growth jobs.
 
-    A program written by hand with moderngl always takes part, and of pyrender, Mitsuba, VTK and Panda3D those that are
-    installed (`pip install 'glshade[peers]'`). They work in turn, each in a process of its own; docs/benchmarks.md says how.
+    The other programs are one written by hand with moderngl, and those of pyrender, Mitsuba, VTK and Panda3D that are
+    installed (`pip install 'glshade[peers]'`). They run in turn, each in a process of its own; docs/benchmarks.md explains how.
     """
     import json
 
-    from glshade.bench.contest import contest
-    from glshade.bench.growth import SERIES, growth
-    from glshade.bench.jobs import jobs
+    from glshade.bench.contest import run_contest
+    from glshade.bench.growth import SERIES, measure_growth
+    from glshade.bench.jobs import measure_jobs
     from glshade.bench.peers import installed
-    from glshade.bench.report import Report, markdown
+    from glshade.bench.report import BenchReport, markdown
     from glshade.bench.works import BY_HAND, WORKS
     from glshade.cli import _table
     from glshade.files import replacing
 
     if as_json and as_markdown:
-        raise click.UsageError("--json or --markdown?")
+        raise click.UsageError("--json and --markdown exclude each other")
     wanted = _table.chosen(names, dict.fromkeys((*WORKS, *MEASURED_BESIDE)), "work")
-    there = dict.fromkeys(installed())
-    programs = list(dict.fromkeys((BY_HAND, *_table.chosen(peers, there, "installed peer"))))
-    report, small = Report(repeat, size == "small"), size == "small"
+    chosen_peers = _table.chosen(peers, dict.fromkeys(installed()), "installed peer")
+    programs = list(dict.fromkeys((BY_HAND, *chosen_peers)))
+    small = size == "small"
+    report = BenchReport(repeat, small)
     for name in dict.fromkeys(wanted):
         click.echo(f"{name} ...", err=True)
         if name == "growth":
-            report.growths = [growth(what, repeat, small) for what in SERIES]
+            report.growths = [measure_growth(what, repeat, small) for what in SERIES]
         elif name == "jobs":
-            report.jobs = jobs(repeat, small)
+            report.jobs = measure_jobs(repeat, small)
         else:
-            report.contests[name] = contest(WORKS[name].small() if small else WORKS[name], programs, repeat)
+            report.contests[name] = run_contest(WORKS[name].small() if small else WORKS[name], programs, repeat)
     if save is not None:
         with replacing(save) as beside:
             beside.write_text(json.dumps(report.as_dict(), indent=1) + "\n", encoding="utf-8")
@@ -82,10 +94,11 @@ def work(
     elif as_markdown:
         click.echo(markdown(report), nl=False)
     else:
-        _tell(report)
+        _print(report)
 
 
-def _tell(report: Report) -> None:
+def _print(report: BenchReport) -> None:
+    """Prints the report as tables for people."""
     from glshade.cli import _table
 
     for line in report.heading():
@@ -98,26 +111,37 @@ def _tell(report: Report) -> None:
 
 @command.command()
 @click.argument("names", metavar="[NAME]...", nargs=-1)
-@click.option("--backend", type=click.Choice(["auto", "egl", "osmesa", "standalone"]), default="auto", show_default=True)
-@click.option("--device", type=int, help="EGL device, as `glshade devices` counts them.")
-@click.option("--repeat", type=click.IntRange(1, 1000), default=7, show_default=True, help="Measurements of each model.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout, for keeping.")
-def brdfs(names: tuple[str, ...], backend: Any, device: int | None, repeat: int, as_json: bool) -> None:
-    """What the models cost: each NAME, or all of them.
+@driver
+@shaders
+@models
+@click.option(
+    "--repeat", type=click.IntRange(1, 1000), default=7, show_default=True, help="Number of measurements of each model."
+)
+@click.option("--json", "as_json", is_flag=True, help="Prints the results as one JSON object.")
+def brdfs(
+    names: tuple[str, ...],
+    backend: Any,
+    device: int | None,
+    shaders: tuple[str, ...],
+    models: tuple[str, ...],
+    repeat: int,
+    as_json: bool,
+) -> None:
+    """Measures the cost of each reflectance model NAME, or of all of them.
 
-    For one evaluation, with the defaults and with each option: nanoseconds a pixel and a vertex, median and range; the
-    operations it asks for, "-" where the driver does not show them; the bytes of its GLSL.
+    The figures are those of one evaluation, with the defaults and with each option: the time at a pixel and at a vertex in
+    nanoseconds, as median and range; the operations, or "-" if the driver does not show them; and the bytes of GLSL.
     """
     from glshade.bench.brdfs import costs, table
     from glshade.brdfs import BRDFS
     from glshade.cli import _table
 
-    found = costs(_table.chosen(names, BRDFS, "model"), repeat, backend, device)
+    measured = costs(_table.chosen(names, BRDFS, "model"), repeat, backend, device, shaders)
     if as_json:
-        _table.as_json(found.as_dict())
+        _table.as_json(measured.as_dict())
         return
-    click.echo(f"{found.renderer}; {found.version}")
-    what = "of one core" if found.clock == "core" else "by the clock on the wall"
-    click.echo(f"{found.threads} threads; nanoseconds {what} an evaluation, median and range of {repeat}")
-    heads, *rows = table(found)
+    click.echo(f"{measured.renderer}; {measured.version}")
+    clock = "of one core" if measured.clock == "core" else "of wall-clock time"
+    click.echo(f"{measured.threads} threads; nanoseconds {clock} for one evaluation, median and range of {repeat}")
+    heads, *rows = table(measured)
     _table.table(heads, rows)

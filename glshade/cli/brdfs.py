@@ -1,4 +1,4 @@
-"""glshade brdfs: the reflectance models, as they declare themselves."""
+"""Command `glshade brdfs`: lists the reflectance models with their declarations."""
 
 from __future__ import annotations
 
@@ -6,14 +6,18 @@ from typing import Any
 
 import click
 
+from glshade.cli._options import models
+
 
 @click.command()
+@models
 @click.argument("names", metavar="[NAME]...", nargs=-1)
-@click.option("--json", "as_json", is_flag=True, help="One JSON list of full declarations on stdout.")
-def command(names: tuple[str, ...], as_json: bool) -> None:
-    """Lists the reflectance models, one a line; with NAMEs, all that those declare.
+@click.option("--json", "as_json", is_flag=True, help="Prints full declarations as one JSON list.")
+def command(names: tuple[str, ...], as_json: bool, models: tuple[str, ...]) -> None:
+    """Lists the reflectance models.
 
-    Parameters with default, range and unit; options; the laws that a model keeps or breaks; the simpler models it becomes.
+    With names, prints the declaration of each NAME: its parameters with default, range and unit, its options, the laws that it
+    keeps or breaks, and the simpler models that it equals in a limit.
     """
     from glshade.brdfs import BRDFS
     from glshade.catalogue import listing
@@ -40,6 +44,7 @@ def command(names: tuple[str, ...], as_json: bool) -> None:
 
 
 def _show(model: dict[str, Any]) -> None:
+    """Prints the full declaration of a model. model: its description, as `listing.brdf` returns it."""
     from glshade.brdfs import Brdf
     from glshade.catalogue import listing
     from glshade.cli import _table
@@ -78,13 +83,13 @@ def _show(model: dict[str, Any]) -> None:
             law,
         )
     if model["shares"] and model["laws"]["energy"]["promised"]:
-        _table.paragraph(f"promised where {' + '.join(model['shares'])} is at most 1", "energy's budget")
+        _table.paragraph(f"kept where {' + '.join(model['shares'])} is at most 1", "energy budget")
     if model["anisotropic"]:
         where = ", ".join(f"{name} = {_table.value(value)}" for name, value in model["isotropic_where"].items())
         _table.paragraph(
-            f"it looks at the tangent; isotropic where {where}" if where else "it looks at the tangent", "anisotropic"
+            f"depends on the tangent; isotropic where {where}" if where else "depends on the tangent", "anisotropic"
         )
     for limit in model["limits"]:
         _table.paragraph(limit["says"], "limit")
-    # The class has no parameters of its own: these are what every material may say of its surface.
-    _table.paragraph(", ".join(name for name in Brdf.model_fields if name != "brdf"), "also, as every material")
+    # The base class has no parameters, so its fields are the keys of the surface, which every material has.
+    _table.paragraph(", ".join(name for name in Brdf.model_fields if name != "brdf"), "keys of every material")

@@ -1,4 +1,4 @@
-"""glshade devices: what EGL offers."""
+"""Command `glshade devices`: lists the devices of EGL."""
 
 from __future__ import annotations
 
@@ -6,20 +6,20 @@ import click
 
 
 @click.command()
-@click.option("--json", "as_json", is_flag=True, help="One JSON list on stdout.")
+@click.option("--json", "as_json", is_flag=True, help="Prints one JSON list.")
 def command(as_json: bool) -> None:
-    """Lists EGL's devices; the number is what --device takes."""
+    """Lists the devices of EGL. Their numbers are the values of --device."""
     import json
     from dataclasses import asdict
 
     from glshade.gl.context import devices
 
-    found = devices()
+    listed = devices()
     if as_json:
-        click.echo(json.dumps([asdict(device) for device in found], indent=2))
+        click.echo(json.dumps([asdict(device) for device in listed], indent=2))
         return
-    for device in found:
+    for device in listed:
         kind = "software" if device.is_software else "hardware"
         click.echo(f"{device.index}: {device.vendor}, EGL {device.version} ({kind})")
-    if not found:
+    if not listed:
         click.echo("EGL lists no devices")

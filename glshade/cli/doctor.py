@@ -1,4 +1,4 @@
-"""glshade doctor: what works here, what the driver really does, and what to do where it does not."""
+"""Command `glshade doctor`: checks whether pictures can be drawn on this machine, and measures the driver."""
 
 from __future__ import annotations
 
@@ -6,81 +6,100 @@ from typing import Any
 
 import click
 
+from glshade.cli._options import driver
+
 
 @click.command()
-@click.option("--backend", type=click.Choice(["auto", "egl", "osmesa", "standalone"]), default="auto", show_default=True)
-@click.option("--device", type=int, help="EGL device, as `glshade devices` counts them.")
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout, for keeping.")
+@driver
+@click.option("--json", "as_json", is_flag=True, help="Prints the results as one JSON object.")
 def command(backend: str, device: int | None, as_json: bool) -> None:
-    """Checks libraries, driver, context and a picture, and measures the driver. Exit code 5 where no picture can be drawn."""
+    """Checks whether pictures can be drawn.
+
+    Checks the libraries, EGL, a context and a picture, and measures the driver. The exit code is 5 if no picture can be drawn.
+    """
     from glshade.errors import GlshadeError
 
-    found: dict[str, Any] = {"well": False, "error": None}
+    results: dict[str, Any] = {"well": False, "error": None}
     say = _nothing if as_json else click.echo
     try:
-        _examine(found, backend, device, say)
+        _examine(results, backend, device, say)
     except GlshadeError as error:
-        found["error"] = str(error)
+        results["error"] = str(error)
         say(f"NOT WELL: {error}")
     if as_json:
         import json
 
-        click.echo(json.dumps(found, indent=2, allow_nan=False))
-    if found["error"] is not None:
+        click.echo(json.dumps(results, indent=2, allow_nan=False))
+    if results["error"] is not None:
         raise SystemExit(5)
 
 
 def _nothing(text: str) -> None:
-    """Where JSON alone is asked for."""
+    """Prints nothing; takes the place of click.echo if only JSON is to be printed."""
 
 
-def _examine(found: dict[str, Any], backend: str, device: int | None, say: Any) -> None:
-    """Fills `found`, and says each thing as it is known. Errors: ContextError and ShaderError where no picture can be drawn."""
+def _examine(results: dict[str, Any], backend: str, device: int | None, say: Any) -> None:
+    """Runs the checks, and reports each result as soon as it is known.
+
+    results: dictionary that the results are added to
+    backend: OpenGL backend, as for Renderer
+    device: EGL device; None leaves the choice to the driver
+    say: function that prints a line
+    Errors: ContextError and ShaderError if no picture can be drawn.
+    """
     import platform
     from importlib.metadata import version
 
-    from glshade.driver.measurement import assumptions, measure
+    from glshade.driver.assumptions import check_assumptions
+    from glshade.driver.measurement import measure
     from glshade.errors import GlshadeError
     from glshade.gl.context import open_context
     from glshade.version import __version__
 
-    found |= {"glshade": __version__, "python": platform.python_version(), "platform": platform.platform()}
-    say(f"glshade {__version__}, Python {found['python']}, {found['platform']}")
+    results |= {"glshade": __version__, "python": platform.python_version(), "platform": platform.platform()}
+    say(f"glshade {__version__}, Python {results['python']}, {results['platform']}")
     names = ("moderngl", "glcontext", "numpy", "OpenImageIO", "trimesh")
-    found["libraries"] = {name: version(name) for name in names}
-    say("libraries: " + ", ".join(f"{name} {version}" for name, version in found["libraries"].items()))
-    found["egl"] = _devices()
-    say(_in_words(found["egl"]))
+    results["libraries"] = {name: version(name) for name in names}
+    say("libraries: " + ", ".join(f"{name} {version}" for name, version in results["libraries"].items()))
+    results["egl"] = _devices()
+    say(_in_words(results["egl"]))
     context = open_context(backend, device)  # type: ignore[arg-type]
     try:
-        found["opengl"] = {
-            **{"renderer": context.renderer, "version": context.version, "backend": context.backend},
-            **{"largest_side": context.largest_side, "samples": context.gl.max_samples, "zero_to_one": context.zero_to_one},
+        results["opengl"] = {
+            "renderer": context.renderer,
+            "version": context.version,
+            "backend": context.backend,
+            "largest_side": context.largest_side,
+            "samples": context.gl.max_samples,
+            "zero_to_one": context.zero_to_one,
         }
-        say(_limits(found["opengl"]))
+        say(_limits(results["opengl"]))
         say(_picture(backend, device))
-        found["well"] = True
+        results["well"] = True
         try:
             measured = measure(context)
         except GlshadeError as error:
-            # A picture was drawn all the same.
-            found["measured"] = None
+            # The measurements are only extra information: a picture was drawn, so the driver works.
+            results["measured"] = None
             say(f"not measured: {error}")
             say("all is well")
             return
-        assumed = assumptions(context, measured)
+        assumed = check_assumptions(context, measured)
     finally:
         context.release()
-    found["measured"], found["assumptions"] = measured, [one.as_dict() for one in assumed]
+    results["measured"], results["assumptions"] = measured, [assumption.as_dict() for assumption in assumed]
     say("\n".join(["measured:", *(f"  {name:<17}{text}" for name, text in _table(measured))]))
-    broken = [one for one in assumed if not one.holds]
-    for one in broken:
-        say(f"CAUTION: glshade assumes {one.what}; here: {one.measured}. So {one.follows}")
-    say(f"a picture is drawn, but mind {len(broken)} caution{'s' * (len(broken) > 1)}" if broken else "all is well")
+    broken = [assumption for assumption in assumed if not assumption.holds]
+    for assumption in broken:
+        say(f"CAUTION: glshade assumes {assumption.what}; measured: {assumption.measured}. So {assumption.follows}")
+    if broken:
+        say(f"pictures can be drawn, with {len(broken)} caution{'s' if len(broken) > 1 else ''}")
+    else:
+        say("all is well")
 
 
 def _devices() -> dict[str, Any]:
-    """What EGL offers; where it has nothing, why."""
+    """Returns a dictionary with EGL's library and devices, and the problem if EGL cannot be used (None if it can be)."""
     import sys
     from dataclasses import asdict
 
@@ -92,11 +111,12 @@ def _devices() -> dict[str, Any]:
     try:
         return {"library": LIBEGL, "problem": None, "devices": [{**asdict(d), "software": d.is_software} for d in devices()]}
     except GlshadeError as error:
-        # Not the end: OSMesa may serve.
+        # The check goes on, because OSMesa may work without EGL.
         return {"library": LIBEGL, "problem": str(error), "devices": []}
 
 
 def _in_words(egl: dict[str, Any]) -> str:
+    """Returns the result of `_devices` as a line."""
     if egl["problem"]:
         return f"EGL: {egl['problem']}"
     return f"EGL: {egl['library']} loads; " + "; ".join(
@@ -105,6 +125,7 @@ def _in_words(egl: dict[str, Any]) -> str:
 
 
 def _limits(opengl: dict[str, Any]) -> str:
+    """Returns the context's name and limits as two lines."""
     depth = "reversed, 0 to 1" if opengl["zero_to_one"] else "reversed, -1 to 1"
     return (
         f"OpenGL: {opengl['renderer']}, {opengl['version']} ({opengl['backend']})\n"
@@ -114,6 +135,7 @@ def _limits(opengl: dict[str, Any]) -> str:
 
 
 def _picture(backend: str, device: int | None) -> str:
+    """Draws a picture of uniform grey, and returns a line about it. Errors: ContextError if its values are wrong."""
     import numpy as np
 
     from glshade.errors import ContextError
@@ -131,24 +153,25 @@ def _picture(backend: str, device: int | None) -> str:
     )
     pixels = render(scene, dtype="float32", backend=backend, device=device).pixels  # type: ignore[arg-type]
     if not np.all(pixels == 0.5):
-        raise ContextError(f"a grey of 0.5 came out as {pixels.min():g} to {pixels.max():g}: the driver is not to be trusted")
+        raise ContextError(f"a grey of 0.5 came out as {pixels.min():g} to {pixels.max():g}: the driver draws wrong values")
     return "picture: a grey of 0.5 came out as 0.5"
 
 
-# Those whose error is told in units of the last place; the others' near their zeros is nothing but that.
+# Functions whose error is reported in units in the last place (ULP). The other functions have zeros. Near a zero, an error in
+# ULP may be arbitrarily large, so their absolute error is reported instead.
 _IN_ULP = ("+", "-", "*", "/", "sqrt", "inversesqrt", "exp2", "pow")
 
 
 def _table(measured: dict[str, Any]) -> list[tuple[str, str]]:
-    """name, value: what a person wants to see of the measurements."""
+    """Returns the measurements that are of interest to people: (name, value)."""
     functions, formats = measured["built_ins"], measured["formats"]
     timer, loops, bits = measured["timer_query"], measured["loop_rounds"], measured["subpixel_bits"]
 
-    def said(offered: bool, held: bool | None, words: tuple[str, str]) -> str:
-        return words[0 if held else 1] if offered else "not offered"
+    def feature(offered: bool, works: bool | None, words: tuple[str, str]) -> str:
+        return words[0 if works else 1] if offered else "not offered"
 
     def rounds(count: int) -> str:
-        return f"{count:,}" + (" or more" if count == loops["tried"] else ": stops there without a word")
+        return f"{count:,}" + (" or more" if count == loops["tried"] else ", where it stops without an error")
 
     denormals = ", ".join(
         f"{stage}: {'kept' if d['read'] and d['made'] else 'flushed when ' + ' and '.join(k for k in d if not d[k])}"
@@ -159,9 +182,9 @@ def _table(measured: dict[str, Any]) -> list[tuple[str, str]]:
     return [
         ("error, ULP", ", ".join(f"{name} {functions[name]['ulp']:.2g}" for name in _IN_ULP)),
         ("error, absolute", ", ".join(f"{n} {f['absolute']:.1e}" for n, f in functions.items() if n not in _IN_ULP)),
-        ("fma", said(measured["fma"]["offered"], measured["fma"]["fused"], ("fused", "not fused"))),
+        ("fma", feature(measured["fma"]["offered"], measured["fma"]["fused"], ("fused", "not fused"))),
         ("a * b + c", "contracted" if any(measured["contracted"].values()) else "two roundings"),
-        ("precise", said(measured["precise"]["offered"], measured["precise"]["kept"], ("kept", "not kept"))),
+        ("precise", feature(measured["precise"]["offered"], measured["precise"]["kept"], ("kept", "not kept"))),
         ("mix(1e8, 1, 1)", f"{measured['mix_at_its_end']:g}"),
         ("denormals", denormals),
         ("loops", f"vertex {rounds(loops['vertex'])}; fragment {rounds(loops['fragment'])}"),
@@ -171,8 +194,8 @@ def _table(measured: dict[str, Any]) -> list[tuple[str, str]]:
             f"rounds {small['rounding']}, off by {small['relative']:.1e}; -1 and less become {small['negative']:g}",
         ),
         ("codes", ", ".join(f"{name} {formats[name]['lsb']:.2f}" for name in ("RGB10_A2", "RGBA8", "SRGB8_ALPHA8")) + " off"),
-        ("timer query", f"tells {timer['share']:.2f} of the time by the clock on the wall"),
-        ("sub-pixel bits", f"{bits['measured']} (the driver says {bits['told']})"),
-        ("interpolation", f"from corners {'as they are' if abs(shift) < 0.1 else 'as they are snapped'}"),
+        ("timer query", f"reports {timer['share']:.2f} of the wall-clock time"),
+        ("sub-pixel bits", f"{bits['measured']} (the driver reports {bits['told']})"),
+        ("interpolation", f"from corners {'before' if abs(shift) < 0.1 else 'after'} they are snapped to the grid"),
         ("samples", " ".join(f"({x:g}, {y:g})" for x, y in measured["sample_positions"]) or "none"),
     ]

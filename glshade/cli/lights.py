@@ -1,4 +1,4 @@
-"""glshade lights: the lights, as they declare themselves."""
+"""Command `glshade lights`: lists the lights with their declarations."""
 
 from __future__ import annotations
 
@@ -6,12 +6,18 @@ from typing import Any
 
 import click
 
+from glshade.cli._options import models
+
 
 @click.command()
+@models
 @click.argument("names", metavar="[NAME]...", nargs=-1)
-@click.option("--json", "as_json", is_flag=True, help="One JSON list of full declarations on stdout.")
-def command(names: tuple[str, ...], as_json: bool) -> None:
-    """Lists the lights, one a line; with NAMEs, all that those declare: keys, falloffs, and the GLSL struct."""
+@click.option("--json", "as_json", is_flag=True, help="Prints full declarations as one JSON list.")
+def command(names: tuple[str, ...], as_json: bool, models: tuple[str, ...]) -> None:
+    """Lists the lights.
+
+    With names, prints the declaration of each NAME: its keys, falloffs and GLSL struct.
+    """
     from glshade.catalogue import listing
     from glshade.cli import _table
     from glshade.lights import LIGHTS
@@ -37,6 +43,7 @@ def command(names: tuple[str, ...], as_json: bool) -> None:
 
 
 def _show(light: dict[str, Any]) -> None:
+    """Prints the full declaration of a light. light: its description, as `listing.light` returns it."""
     from glshade.cli import _table
 
     _table.title(light["name"], light["summary"])
@@ -53,5 +60,7 @@ def _show(light: dict[str, Any]) -> None:
     if light["falloffs"]:
         _table.paragraph(", ".join(light["falloffs"]), "falloffs")
     if light["omnidirectional"]:
-        _table.paragraph("from everywhere: it adds the ambient reflectance times its intensity", "direction")
+        _table.paragraph(
+            "from all around: a surface reflects the light for its normal times the model's ambient reflectance", "direction"
+        )
     _table.paragraph(", ".join(f"{kind} {name}" for name, kind in light["uniforms"].items()), "GLSL struct")

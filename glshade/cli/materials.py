@@ -1,4 +1,4 @@
-"""glshade materials: the presets that ship with glshade."""
+"""Command `glshade materials`: lists the presets that ship with glshade."""
 
 from __future__ import annotations
 
@@ -6,40 +6,45 @@ from typing import Any
 
 import click
 
+from glshade.cli._options import models
+
 
 @click.command()
+@models
 @click.argument("names", metavar="[NAME]...", nargs=-1)
-@click.option("--json", "as_json", is_flag=True, help="One JSON list on stdout.")
-def command(names: tuple[str, ...], as_json: bool) -> None:
-    """Lists the presets that `material = "gold"` chooses from; with NAMEs, their tables, to paste and change.
+@click.option("--json", "as_json", is_flag=True, help="Prints one JSON list.")
+def command(names: tuple[str, ...], as_json: bool, models: tuple[str, ...]) -> None:
+    """Lists the presets of materials.
 
-    The swatch is what the material shows from straight above under a white sky.
+    A scene names a preset as in `material = "gold"`. With names, prints the table of each NAME, for a scene file. The swatch
+    is the colour of the material, seen at a right angle under a white sky.
     """
     from glshade.catalogue import listing
     from glshade.cli import _table
     from glshade.presets import PRESETS
 
     chosen = _table.chosen(names, PRESETS, "preset")
-    found = [listing.preset(name) for name in chosen]
+    described = [listing.preset(name) for name in chosen]
     if as_json:
-        _table.as_json(found)
+        _table.as_json(described)
     elif names:
-        presets = dict(zip(chosen, found, strict=True))
+        presets = dict(zip(chosen, described, strict=True))
         _table.each(chosen, lambda name: _show(presets[name]))
     else:
         _table.table(
             ("preset", "swatch", "model", "what it looks like", "source"),
-            [(one["name"], _swatch(one["swatch"]), one["brdf"], one["description"], one["source"]) for one in found],
+            [(item["name"], _swatch(item["swatch"]), item["brdf"], item["description"], item["source"]) for item in described],
         )
 
 
 def _swatch(code: str) -> tuple[str, str]:
-    """The code on its own colour, in black or white as it reads better."""
+    """Returns a table cell whose background is the colour and whose text is its code, in black or white for best contrast."""
     luminance = sum(w * int(code[i : i + 2], 16) for w, i in ((0.2126, 1), (0.7152, 3), (0.0722, 5)))
     return code, f"{'black' if luminance > 127 else 'white'} on {code}"
 
 
 def _show(preset: dict[str, Any]) -> None:
+    """Prints a preset as a table for a scene file. preset: its description, as `listing.preset` returns it."""
     import json
 
     from glshade.cli import _table
@@ -51,9 +56,10 @@ def _show(preset: dict[str, Any]) -> None:
     click.echo()
     click.echo(f"[materials.{preset['name']}]")
     for key, value in preset["material"].items():
-        # What these tables hold reads alike in TOML and JSON.
+        # The values of a preset are written alike in JSON and in TOML.
         click.echo(f"{key} = {json.dumps(value)}")
 
 
 def _rgb(code: str) -> tuple[int, int, int]:
+    """Returns the codes from 0 to 255 of a colour such as #ffd700."""
     return int(code[1:3], 16), int(code[3:5], 16), int(code[5:7], 16)

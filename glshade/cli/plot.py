@@ -1,4 +1,4 @@
-"""glshade plot: what materials do with light, as curves and pictures."""
+"""Command `glshade plot`: plots the reflectance of materials as curves and pictures."""
 
 from __future__ import annotations
 
@@ -9,11 +9,14 @@ from typing import Any
 
 import click
 
+from glshade.cli._options import driver, models, shaders
+
+# The values of --kind: the kinds of panels, and "all" for all of them.
 KINDS = ("all", "polar", "lobe", "sphere", "furnace", "albedo", "fresnel")
 
 
 class Angles(click.ParamType[tuple[float, ...]]):
-    """`0,30,60`: degrees."""
+    """An option's type: angles of incidence such as `0,30,60` [degrees]."""
 
     name = "DEGREES,..."
 
@@ -33,16 +36,25 @@ class Angles(click.ParamType[tuple[float, ...]]):
 @click.command()
 @click.argument("materials", metavar="MATERIAL...", nargs=-1, required=True)
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="Figure to write: .svg, .png or .pdf. [default: MATERIAL.svg]"
+    "-o", "--output", type=click.Path(path_type=Path), help="Figure to write, as .svg, .png or .pdf. [default: MATERIAL.svg]"
 )
 @click.option(
-    "-k", "--kind", "kinds", type=click.Choice(KINDS), multiple=True, help="What to show, as often as wanted. [default: all]"
+    "-k", "--kind", "kinds", type=click.Choice(KINDS), multiple=True, help="Kind of panel to show; repeatable. [default: all]"
 )
 @click.option(
-    "-p", "--parameter", "parameters", metavar="NAME=VALUE", multiple=True, help="Of all materials; as often as wanted."
+    "-p",
+    "--parameter",
+    "parameters",
+    metavar="NAME=VALUE",
+    multiple=True,
+    help="Replaces a parameter of all materials; repeatable.",
 )
 @click.option(
-    "--angles", type=Angles(), default="0,30,60,80", show_default=True, help="Of incidence, of the polar slices [degrees]."
+    "--angles",
+    type=Angles(),
+    default="0,30,60,80",
+    show_default=True,
+    help="Angles of incidence of the polar slices [degrees].",
 )
 @click.option(
     "--incidence",
@@ -50,7 +62,7 @@ class Angles(click.ParamType[tuple[float, ...]]):
     metavar="DEGREES",
     default=45.0,
     show_default=True,
-    help="Of the solid lobe [degrees].",
+    help="Angle of incidence of the solid lobe [degrees].",
 )
 @click.option(
     "--azimuth",
@@ -58,25 +70,28 @@ class Angles(click.ParamType[tuple[float, ...]]):
     metavar="DEGREES",
     default=0.0,
     show_default=True,
-    help="Of the plane of incidence, from the tangent [degrees].",
+    help="Angle of the plane of incidence from the tangent [degrees].",
 )
 @click.option(
     "--quantity",
     type=click.Choice(["f-cos", "f"]),
     default="f-cos",
     show_default=True,
-    help="The light that leaves, or the BRDF.",
+    help="Quantity to plot: f-cos, the BRDF times the cosine, or f, the BRDF.",
 )
 @click.option(
     "--scale",
     type=click.Choice(["auto", "linear", "log"]),
     default="auto",
     show_default=True,
-    help="Of slices and lobes; auto: by the log where a linear one would hide a curve.",
+    help="Scale of slices and lobes; auto is logarithmic where a linear scale would hide a curve.",
 )
-@click.option("--bare", is_flag=True, help="Only the picture, for --kind lobe, sphere or furnace; EXR, JPEG and others too.")
-@click.option("--backend", type=click.Choice(["auto", "egl", "osmesa", "standalone"]), default="auto", show_default=True)
-@click.option("--device", type=int, help="EGL device, as `glshade devices` counts them.")
+@click.option(
+    "--bare", is_flag=True, help="Writes only the picture of --kind lobe, sphere or furnace, in any format of `glshade render`."
+)
+@driver
+@shaders
+@models
 def command(
     materials: tuple[str, ...],
     output: Path | None,
@@ -90,17 +105,21 @@ def command(
     bare: bool,
     backend: Any,
     device: int | None,
+    shaders: tuple[str, ...],
+    models: tuple[str, ...],
 ) -> None:
-    """Plots MATERIALs, laid over each other: models, presets, or the materials of a scene.
+    """Plots the reflectance of materials.
+
+    Plots each MATERIAL over the others in one figure. A MATERIAL is a model, a preset, or a material of a scene:
 
     \b
       MODEL    phong    phong:exponent=100    plastic:kd=0.6,0.1,0.05,ior=1.7
       PRESET   gold     gold:roughness=0.5
       SCENE    ball.toml    ball.toml:red    ball.toml:red:ks=0.5
 
-    Kinds: polar, slices of the lobe in the plane of incidence; lobe, the lobe as a solid; sphere, one under one light;
-    furnace, a sphere under a white sky, where nothing lost is nothing seen; albedo, what is reflected in all, over the angle;
-    fresnel, of models that have it, exact and Schlick's.
+    Kinds: polar shows slices of the lobe in the plane of incidence; lobe shows the lobe as a solid; sphere shows a sphere under
+    one light; furnace shows a sphere under a white sky, where it is invisible if no energy is lost; albedo shows the reflected
+    share of the light over the angle of incidence; fresnel shows the exact Fresnel factor and Schlick's, for models with one.
 
     \b
     Examples:
@@ -118,7 +137,8 @@ def command(
     if bare and (len(wanted) != 1 or wanted[0] not in plots.PICTURES):
         raise click.UsageError("--bare needs one --kind that is a picture: lobe, sphere or furnace")
     if output is None:
-        # As it was typed, without what a file name should not have.
+        # The name consists of the materials as they were typed. Characters that are awkward in file names are replaced, and a
+        # long name is cut off.
         name = re.sub(r"[^\w.=-]+", "-", "-".join(Path(text).name for text in materials))
         output = Path(name[:80] + (".png" if bare else ".svg"))
     if bare:
@@ -136,11 +156,11 @@ def command(
         "azimuth": math.radians(azimuth),
         "quantity": quantity.replace("-", " "),
     }
-    # Only materials without faults are worth a context.
+    # The context is opened only after all materials are checked, because checks are quick and opening a context is slow.
     if plots.DRAWN & set(wanted):
         from glshade.gl.renderer import Renderer
 
-        opened: Any = Renderer(backend, device)
+        opened: Any = Renderer(backend, device, shaders=shaders)
     else:
         opened = nullcontext()
     with opened as renderer:
@@ -153,7 +173,14 @@ def command(
 
 
 def _bare(materials: Any, kind: str, options: Any, scale: str, renderer: Any) -> Any:
-    """The pictures side by side."""
+    """Draws the pictures of materials side by side.
+
+    materials: label -> material
+    kind: "furnace", "sphere" or "lobe"
+    options: incidence and azimuth [rad] and quantity, for a lobe
+    scale: "auto", "linear" or "log", for a lobe
+    renderer: the renderer; None for "furnace", which needs none
+    """
     from glshade.catalogue import pictures
 
     images = []
@@ -165,7 +192,7 @@ def _bare(materials: Any, kind: str, options: Any, scale: str, renderer: Any) ->
             scene = pictures.sphere(material, 512)
         else:
             scene, _ = pictures.solid(material, **options, scale="log" if scale == "log" else "linear", size=800)
-        # The picture is the renderer's until it draws the next.
+        # The renderer reuses the memory of its picture for the next one.
         image = renderer.render(scene, dtype="float32")
         images.append(type(image)(image.pixels.copy()))
     return pictures.side_by_side(images)

@@ -1,9 +1,8 @@
-"""glshade render: scenes or meshes go in, pictures come out."""
+"""Command `glshade render`: renders scenes or meshes to picture files."""
 
 from __future__ import annotations
 
 import os
-import re
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
@@ -14,143 +13,84 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from glshade.cli._options import Crop, Duration, Size, driver, filmed, models, overrides, shaders
+from glshade.image.formats import FORMATS
+from glshade.mesh.formats import SUFFIXES
+
 if TYPE_CHECKING:
-    from glshade.batch.frames import Picture
+    from glshade.batch.frames import Shot
     from glshade.batch.maker import Maker
     from glshade.batch.task import Task
     from glshade.cli._progress import Plain
     from glshade.gl.renderer import Renderer
     from glshade.scene.scene import Scene
-    from glshade.tradeoff.budget import Choice
-
-# The film's keys whose options are called otherwise.
-OPTIONS = {"aovs": "aov"}
+    from glshade.tradeoff.choice import Choice
 
 
-class Size(click.ParamType[tuple[int, int]]):
-    """`640x480`."""
-
-    name = "WxH"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
-        if isinstance(value, tuple):
-            return value
-        match = re.fullmatch(r"(\d+)x(\d+)", value)
-        if not match or "0" in match.groups():
-            self.fail(f"{value!r} is not a size such as 640x480", param, ctx)
-        return int(match[1]), int(match[2])
-
-
-class Crop(click.ParamType[tuple[int, int, int, int]]):
-    """`10,20,64x48`."""
-
-    name = "X,Y,WxH"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int, int, int]:
-        if isinstance(value, tuple):
-            return value
-        match = re.fullmatch(r"(\d+),(\d+),(\d+)x(\d+)", value)
-        if not match:
-            self.fail(f"{value!r} is not a window such as 10,20,64x48", param, ctx)
-        x, y, width, height = map(int, match.groups())
-        return x, y, width, height
-
-
-class Duration(click.ParamType[float]):
-    """`5ms`, `0.2s`; a bare number is in milliseconds. Gives seconds."""
-
-    name = "TIME"
-
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        if isinstance(value, float):
-            return value
-        match = re.fullmatch(r"([0-9.]+(?:e-?\d+)?)\s*(ms|s|)", value)
-        try:
-            seconds = float(match[1]) * (1.0 if match[2] == "s" else 1e-3) if match else 0.0
-        except ValueError:
-            seconds = 0.0
-        if not seconds > 0:
-            self.fail(f"{value!r} is not a time such as 5ms or 0.2s", param, ctx)
-        return seconds
-
-
-def overrides(command: Any) -> Any:
-    """The option --set, which gives `overrides`: (key, text), as `glshade.load` takes them."""
-    return click.option(
-        "--set",
-        "overrides",
-        multiple=True,
-        metavar="KEY=VALUE",
-        callback=lambda ctx, param, texts: _assignments(texts, param),
-        help="Puts a value in the place of the scene's: quality.fresnel=schlick, materials.body.roughness=0.3, "
-        "objects.ball.material=gold, lights.0.intensity=2, film.size=[640,360]; repeatable.",
-    )(command)
-
-
-def _assignments(texts: tuple[str, ...], option: click.Parameter) -> list[tuple[str, str]]:
-    if not texts:
-        return []
-    from glshade.scene.override import split
-
-    try:
-        return [split(text) for text in texts]
-    except ValueError as error:
-        raise click.BadParameter(str(error), param=option) from None
-
-
-@click.command()
+@click.command(epilog=f"Mesh files: {' '.join(SUFFIXES)}")
 @click.argument("scenes", metavar="SCENE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "-o",
     "--output",
-    help="Picture to write; the extension says how: png, jpg, tif, exr, hdr. Of several pictures: a pattern with {scene}, "
-    "{camera}, a sweep's {key} and a # for each digit of the frame. [default: NAME.png]",
+    help=f"Picture to write; the extension names the format: {', '.join(FORMATS)}. For several pictures, a pattern with "
+    "{scene}, {camera}, a sweep's {key} and a # for each digit of the frame. [default: NAME.png]",
 )
-@click.option("-f", "--frames", metavar="RANGE", help="Frames of the scene's animation: 1-100, 1-100x5, 1,3,7-9, 1..100.")
 @click.option(
-    "--camera", "cameras", multiple=True, metavar="NAME", help="Looks through one of the scene's `cameras`; repeatable."
+    "-f", "--frames", metavar="RANGE", help="Frames of the scene's animation, such as 1-100, 1-100x5, 1,3,7-9 or 1..100."
+)
+@click.option(
+    "--camera", "cameras", multiple=True, metavar="NAME", help="Renders through one of the scene's `cameras`; repeatable."
 )
 @click.option(
     "--sweep",
     "sweeps",
     multiple=True,
     metavar="KEY=A,B,C",
-    help="A picture for each of the values, as --set takes them; repeated, for each combination.",
+    help="Makes a picture for each value, as --set takes it; if repeated, one for each combination.",
 )
 @click.option(
-    "--overwrite", is_flag=True, help="Of several pictures: replaces those that are there. (One picture always does.)"
+    "--overwrite", is_flag=True, help="Replaces pictures of a batch that exist. (A single picture is always replaced.)"
 )
-@click.option("--skip-existing", is_flag=True, help="Leaves out pictures whose files are there.")
-@click.option("--resume", is_flag=True, help="Leaves out pictures whose files say that they are these very pictures.")
-@click.option("--jobs", type=click.IntRange(1), metavar="N", help="Worker processes. [default: one a GPU, else one a core]")
+@click.option("--skip-existing", is_flag=True, help="Skips pictures whose files exist.")
 @click.option(
-    "--cluster", metavar="ADDRESS", help="Works on dask: `local`, or a scheduler such as tcp://host:8786; needs glshade[dist]."
+    "--resume", is_flag=True, help="Skips pictures whose files already hold the same picture, by the digest in the file."
+)
+@click.option(
+    "--jobs",
+    type=click.IntRange(1),
+    metavar="N",
+    help="Number of worker processes. [default: one for each GPU, or else for each core]",
+)
+@click.option(
+    "--cluster", metavar="ADDRESS", help="Runs on dask: `local`, or a scheduler such as tcp://host:8786. Needs glshade[dist]."
 )
 @click.option(
     "--retries",
     type=click.IntRange(0),
     default=2,
     show_default=True,
-    help="Times that a picture whose worker died is made again.",
+    help="Number of times that a picture is made again after its worker died.",
 )
 @click.option(
     "--manifest",
     type=click.Path(path_type=Path, dir_okay=False),
-    help="Log of what came of every picture. [default: of several pictures, manifest.jsonl in their folder]",
+    help="Log file of all pictures. [default: manifest.jsonl in the folder of a batch; none for a single picture]",
 )
-@click.option("--json", "as_json", is_flag=True, help="What happens, on stdout, one JSON object a line.")
+@click.option("--json", "as_json", is_flag=True, help="Prints the events of the batch to stdout, one JSON object a line.")
 @click.option("--size", type=Size(), help="Overrides the film's size [pixels].")
-@click.option("--crop", type=Crop(), help="Draws this window of the picture alone; from the top left [pixels].")
-@click.option("--samples", type=click.Choice(["1", "2", "4", "8"]), help="Overrides the film's samples a pixel.")
-@click.option("--supersample", type=int, metavar="N", help="The mean of N x N pictures, shifted within the pixel.")
-@click.option("--tile", type=click.IntRange(2), metavar="N", help="Largest side drawn in one piece [pixels].")
+@click.option("--crop", type=Crop(), help="Draws only this window of the picture, counted from the top left [pixels].")
+@click.option("--samples", type=click.Choice(["1", "2", "4", "8"]), help="Overrides the film's samples per pixel.")
+@click.option("--supersample", type=int, metavar="N", help="Averages N x N pictures, each shifted within the pixel.")
+@click.option(
+    "--tile", type=click.IntRange(2), metavar="N", help="Largest side of a region that is drawn in one piece [pixels]."
+)
 @click.option(
     "--shading",
     type=click.Choice(["flat", "gouraud", "phong"]),
-    help="Per face, per vertex or per pixel, for the whole picture.",
+    help="Shading per face, per vertex or per pixel, for the whole picture.",
 )
 @overrides
-@click.option("--reference", is_flag=True, help="Drawn by the float64 reference, on the CPU; one sample a pixel.")
+@click.option("--reference", is_flag=True, help="Draws with the float64 reference on the CPU, with one sample per pixel.")
 @click.option("--exposure", type=float, help="Overrides the film's exposure [stops].")
 @click.option("--view", metavar="NAME", help="OpenColorIO view of 8-bit pictures.")
 @click.option("--display", metavar="NAME", help="OpenColorIO display of 8-bit pictures.")
@@ -160,17 +100,21 @@ def _assignments(texts: tuple[str, ...], option: click.Parameter) -> list[tuple[
     "aovs",
     multiple=True,
     metavar="NAME[,NAME]",
-    help="Layers beside the picture: depth, normal, lights, ...; repeatable.",
+    help="Writes layers beside the picture, such as depth, normal or lights; repeatable.",
 )
 @click.option(
     "--budget",
     multiple=True,
     metavar="METRIC=LIMIT",
-    help="Draws with the cheapest settings whose error stays within it: max_abs=2e-3, rmse=, p999=, codes=, flip=.",
+    help="Draws with the fastest settings whose error stays within a limit, such as max_abs=2e-3. Metrics: max_abs, rmse, "
+    "p999, codes, flip. If repeated, all limits hold.",
 )
-@click.option("--deadline", type=Duration(), help="Draws as exactly as can be in a time: 5ms.")
-@click.option("--backend", type=click.Choice(["auto", "egl", "osmesa", "standalone"]), default="auto", show_default=True)
-@click.option("--device", type=int, help="EGL device, as `glshade devices` counts them.")
+@click.option(
+    "--deadline", type=Duration(), help="Draws with the most exact settings that take no longer than this time, such as 5ms."
+)
+@driver
+@shaders
+@models
 @click.pass_context
 def command(
     ctx: click.Context,
@@ -196,15 +140,17 @@ def command(
     deadline: float | None,
     backend: Any,
     device: int | None,
+    shaders: tuple[str, ...],
+    models: tuple[str, ...],
     samples: str | None,
     ocio: str | None,
     aovs: tuple[str, ...],
     **film: Any,
 ) -> None:
-    """Renders scenes (.toml, .json, or a mesh: .obj .ply .stl .off .glb .gltf) to pictures.
+    """Renders each SCENE (.toml, .json, or a mesh file) to a picture.
 
-    Several frames, cameras, values or scenes are a batch, made by several processes: it refuses to begin where one of its
-    pictures is there already, unless told to --overwrite, to --skip-existing or to --resume.
+    Several frames, cameras, values or scenes form a batch, which several processes make. A batch does not begin if one of its
+    files exists, unless --overwrite, --skip-existing or --resume is given.
     """
     since = perf_counter()
     from glshade.image.file import check_suffix
@@ -213,7 +159,9 @@ def command(
         check_suffix(Path(output))
     limits = _limits(budget)
     if (limits or deadline) and (reference or shading or (limits and deadline)):
-        raise click.UsageError("--budget and --deadline choose the settings: not together, nor with --shading or --reference")
+        raise click.UsageError(
+            "--budget and --deadline choose the settings, so they exclude each other, --shading and --reference"
+        )
     if overwrite + skip_existing + resume > 1:
         raise click.UsageError("--overwrite, --skip-existing and --resume exclude each other")
     film |= {"samples": samples and int(samples), "ocio": ocio and _configuration(ocio), "aovs": _names(aovs)}
@@ -228,43 +176,47 @@ def command(
     left = {task.number for task in tasks} - {task.number for task in skipped}
     wanted = [task for task in tasks if task.number in left]
     if several and manifest is None:
-        folder = os.path.commonpath([os.path.abspath(os.path.dirname(task.output)) for task in tasks])
-        manifest = Path(os.path.relpath(folder)) / "manifest.jsonl"
+        manifest = _default_manifest(tasks)
 
+    options = {"backend": backend, "reference": reference, "shaders": shaders, "models": models, "retries": retries}
     with ExitStack() as stack:
         workers = None
         if several and wanted:
-            # They start while this process imports what it takes to look at the scenes, and does.
-            workers = stack.enter_context(_workers(cluster, jobs, len(wanted), backend, device, reference, retries))
+            # The workers start while this process imports further modules and checks the scenes.
+            workers = stack.enter_context(_workers(cluster, jobs, len(wanted), device, options))
 
         from glshade.batch import leftovers
         from glshade.batch.maker import Maker
         from glshade.batch.manifest import Manifest
-        from glshade.batch.run import run
+        from glshade.batch.run import run_batch
         from glshade.cli._progress import progress
 
-        shown = progress(as_json, several, str(manifest) if manifest else None)
-        maker = Maker(backend, device)
+        display = progress(as_json, several, str(manifest) if manifest else None)
+        maker = Maker(backend, device, shaders, models)
         stack.callback(maker.close)
-        first = _checked(wanted, maker, shown)
+        first = _checked(wanted, maker, display)
         if limits or deadline:
             wanted = _at_settings(wanted, first, maker, limits, deadline)
         if workers is None:
-            from glshade.batch.here import Here
+            from glshade.batch.in_process import InProcess
 
-            # A budget's choice changes the scene that was checked.
-            workers = Here(maker, {} if limits or deadline else first, reference)
+            # The scenes that were checked are used again, unless --budget or --deadline changes their settings.
+            workers = InProcess(maker, {} if limits or deadline else first, reference)
         if several:
             _make_folders(wanted)
         leftovers.remove(task.output for task in wanted)
         log = stack.enter_context(Manifest(manifest)) if manifest and wanted else None
-        outcome = run(wanted, workers, log, shown, skipped=skipped, since=since)
+        outcome = run_batch(wanted, workers, log, display, skipped=skipped, since=since)
+    if several:
+        # A worker of a command that was killed may have been alive when this batch began, and have ended since.
+        leftovers.remove(task.output for task in wanted)
     ctx.exit(outcome.exit_code)
 
 
 def _pictures(
     scenes: Sequence[Path], frames: str | None, cameras: tuple[str, ...], output: str | None, sweeps: tuple[str, ...]
-) -> list[Picture]:
+) -> list[Shot]:
+    """Returns the pictures to make, from the values of the options. Errors: click.BadParameter, which names the option."""
     from glshade.batch.frames import parse, parse_sweep, pictures
 
     try:
@@ -281,7 +233,14 @@ def _pictures(
         raise click.BadParameter(str(error), param_hint="'--output'") from None
 
 
-def _task(number: int, picture: Picture, overrides: Sequence[tuple[str, str]], common: Mapping[str, Any]) -> Task:
+def _task(number: int, picture: Shot, overrides: Sequence[tuple[str, str]], common: Mapping[str, Any]) -> Task:
+    """Returns the task of a picture.
+
+    number: index of the task in the batch
+    picture: the picture to make
+    overrides: (key, text) pairs of --set, which apply before those of a sweep
+    common: fields of Task that are equal for all pictures
+    """
     from glshade.batch.task import Task
 
     changes = (*overrides, *picture.overrides)
@@ -290,27 +249,38 @@ def _task(number: int, picture: Picture, overrides: Sequence[tuple[str, str]], c
 
 
 def _refuse_existing(tasks: Sequence[Task]) -> None:
-    there = [task.output for task in tasks if os.path.exists(task.output)]
-    if there:
-        more = f" and {len(there) - 1} more" if len(there) > 1 else ""
-        raise click.UsageError(f"{there[0]}{more} exists: --overwrite, --skip-existing or --resume?")
+    """Checks that no picture's file exists yet. Errors: click.UsageError if one does."""
+    existing = [task.output for task in tasks if os.path.exists(task.output)]
+    if existing:
+        more = f" and {len(existing) - 1} more" if len(existing) > 1 else ""
+        raise click.UsageError(f"{existing[0]}{more} exists: choose --overwrite, --skip-existing or --resume")
 
 
-def _workers(
-    cluster: str | None, jobs: int | None, pictures: int, backend: str, device: int | None, reference: bool, retries: int
-) -> Any:
-    """A pool or a cluster, started: an Engine that is a context manager."""
+def _default_manifest(tasks: Sequence[Task]) -> Path:
+    """Returns manifest.jsonl in the folder that the pictures have in common."""
+    folder = os.path.commonpath([os.path.abspath(os.path.dirname(task.output)) for task in tasks])
+    return Path(os.path.relpath(folder)) / "manifest.jsonl"
+
+
+def _workers(cluster: str | None, jobs: int | None, pictures: int, device: int | None, options: dict[str, Any]) -> Any:
+    """Starts a pool or a cluster, and returns it: an Engine that is a context manager.
+
+    cluster: value of --cluster; None starts a pool
+    jobs: number of workers; None selects the default
+    pictures: number of pictures to make
+    device: EGL device for all workers; None spreads them over the GPUs
+    options: backend, reference, shaders, models and retries, as Pool and Cluster take them
+    Errors: click.UsageError; those of Pool and Cluster.
+    """
     from glshade.batch.jobs import devices, gpus
 
-    own = cluster in (None, "local")
-    if jobs and not own:
-        raise click.UsageError("--jobs is for workers of this machine: a scheduler has its own")
-    if reference or backend not in ("auto", "egl"):
-        found = []
-    else:
-        found = gpus() if device is None and own else []
-    on = devices(jobs, pictures, found if device is None else [device])
-    how: dict[str, Any] = {"backend": backend, "reference": reference, "retries": retries}
+    local = cluster in (None, "local")
+    if jobs and not local:
+        raise click.UsageError("--jobs is for workers on this machine; a scheduler has workers of its own")
+    may_use_gpus = local and device is None and not options["reference"] and options["backend"] in ("auto", "egl")
+    hardware = gpus() if may_use_gpus else []
+    assigned = devices(jobs, pictures, hardware if device is None else [device])
+    options = {**options, "hardware": bool(hardware), "shares": len(assigned) > 1}
     if cluster is not None:
         from glshade.batch.cluster import Cluster, check_address
 
@@ -318,34 +288,44 @@ def _workers(
             check_address(cluster)
         except ValueError as error:
             raise click.BadParameter(str(error), param_hint="'--cluster'") from None
-        return Cluster(cluster, on, hardware=bool(found), shares=len(on) > 1, **how)
+        return Cluster(cluster, assigned, **options)
     from glshade.batch.pool import Pool
 
-    return Pool(on, hardware=bool(found), shares=len(on) > 1, **how)
+    return Pool(assigned, **options)
 
 
-def _checked(tasks: Sequence[Task], maker: Maker, shown: Plain) -> dict[int, Scene]:
-    """The first picture of every file, by its number: only a scene without faults is worth a context.
+def _checked(tasks: Sequence[Task], maker: Maker, display: Plain) -> dict[int, Scene]:
+    """Loads the scene of the first task of each scene file, so that faults are found before a context is opened.
 
-    Errors: SceneError; click.BadParameter for a film that cannot be.
+    tasks: the tasks to check
+    maker: loads the scenes and keeps their files
+    display: prints the warnings
+    Returns task number -> scene. Errors: SceneError; click.BadParameter for an invalid film.
     """
-    found: dict[int, Scene] = {}
+    scenes: dict[int, Scene] = {}
     seen: set[str] = set()
     for task in tasks:
         if task.scene not in seen:
             seen.add(task.scene)
-            with warnings.catch_warnings(record=True) as heard:
+            with warnings.catch_warnings(record=True) as caught:
                 warnings.simplefilter("always")
-                found[task.number] = filmed(maker.scene(replace(task, film={})), task.film)
-            for warning in heard:
-                shown.warn(str(warning.message))
-    return found
+                scenes[task.number] = filmed(maker.scene(replace(task, film={})), task.film)
+            for warning in caught:
+                display.warn(str(warning.message))
+    return scenes
 
 
 def _at_settings(
     tasks: Sequence[Task], first: Mapping[int, Scene], maker: Maker, limits: dict[str, float], deadline: float | None
 ) -> list[Task]:
-    """The tasks with what is good enough, or quick enough, for the first picture of their file."""
+    """Returns the tasks with settings. --budget or --deadline selects them for the first picture of each scene file.
+
+    tasks: the tasks, without settings
+    first: number of the first task of each scene file -> the scene
+    maker: holds the renderer that measures
+    limits: metric -> largest error, of --budget
+    deadline: largest time of a picture [s], of --deadline; None if --budget is given
+    """
     chosen: dict[str, tuple[Mapping[str, Any], ...]] = {}
     for task in tasks:
         if task.number in first:
@@ -355,7 +335,10 @@ def _at_settings(
 
 
 def _make_folders(tasks: Sequence[Task]) -> None:
-    """Those that a pattern names; one picture has to find its folder there. Errors: GlshadeError."""
+    """Creates the folders of a batch's pictures. The folder of a single picture is not created: it must exist already.
+
+    Errors: GlshadeError.
+    """
     from glshade.errors import GlshadeError
 
     for folder in dict.fromkeys(os.path.dirname(task.output) for task in tasks):
@@ -366,36 +349,20 @@ def _make_folders(tasks: Sequence[Task]) -> None:
 
 
 def _configuration(text: str) -> str:
-    """Beside the command, not beside the scene."""
+    """Returns the value of --ocio with an absolute path: a relative `film.ocio` would start at the scene file's folder."""
     return text if text.startswith("ocio://") else os.path.abspath(text)
 
 
 def _names(texts: Sequence[str]) -> tuple[str, ...] | None:
+    """Returns the names in texts such as `depth,normal`; None if the texts contain no name."""
     return tuple(name.strip() for text in texts for name in text.split(",") if name.strip()) or None
 
 
-def filmed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
-    """The scene on another film; None changes nothing. Errors: click.BadParameter, of the option named as the film's key."""
-    changes = {key: value for key, value in changes.items() if value is not None}
-    if not changes:
-        return scene
-    from pydantic import ValidationError
-
-    from glshade.scene.scene import Film
-
-    try:
-        film = Film.model_validate({**scene.film.model_dump(), **changes})
-    except ValidationError as error:
-        first = error.errors(include_url=False)[0]
-        key = str(first["loc"][0])
-        raise click.BadParameter(first["msg"], param_hint=f"'--{OPTIONS.get(key, key)}'") from None
-    return scene.model_copy(update={"film": film})
-
-
 def _limits(texts: tuple[str, ...]) -> dict[str, float]:
+    """Returns the limits of --budget: metric -> largest error. Errors: click.BadParameter."""
     if not texts:
         return {}
-    from glshade.tradeoff.budget import parse
+    from glshade.tradeoff.choice import parse
 
     try:
         return parse(texts)
@@ -404,10 +371,10 @@ def _limits(texts: tuple[str, ...]) -> dict[str, float]:
 
 
 def _chosen(scene: Scene, renderer: Renderer, limits: dict[str, float], deadline: float | None) -> Choice:
-    """The settings that are good enough, or quick enough, and a word on stderr."""
+    """Returns the settings that --budget or --deadline selects for a scene, and prints them to stderr."""
     from glshade.tradeoff.budget import choose, within_deadline
 
     choice = choose(scene, renderer, limits) if deadline is None else within_deadline(scene, renderer, deadline)
-    for line in choice.says(scene).splitlines():
+    for line in choice.summary(scene).splitlines():
         click.echo(line, err=True)
     return choice

@@ -1,12 +1,15 @@
-"""glshade schema: the scene file's JSON schema."""
+"""Command `glshade schema`: prints the JSON schema of scene files."""
 
 from __future__ import annotations
 
 import click
 
+from glshade.cli._options import models
+
 
 @click.command()
-def command() -> None:
+@models
+def command(models: tuple[str, ...]) -> None:
     """Prints the JSON schema of scene files, for editors and validators."""
     import json
 

@@ -1,4 +1,4 @@
-"""glshade tradeoff: what a scene's settings cost, and what they are off by."""
+"""Command `glshade tradeoff`: measures the time and the error of a scene's settings."""
 
 from __future__ import annotations
 
@@ -9,36 +9,39 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from glshade.cli.render import Size, filmed, overrides
+from glshade.cli._options import Size, driver, filmed, models, overrides, shaders
 
 if TYPE_CHECKING:
     from glshade.tradeoff.study import Study
 
-# Where nobody looks on, one line for each of so many parts of the work.
+# Largest number of progress lines that are printed if stderr is not a terminal.
 PARTS = 10
+# A function that shows progress. Its arguments: the setting in words, the number of settings measured, the number of all
+# settings.
 Progress = Callable[[str, int, int], None]
 
 
 @click.command()
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Folder to write. [default: tradeoff-NAME]"
+    "-o", "--output", type=click.Path(path_type=Path, file_okay=False), help="Folder for the results. [default: tradeoff-NAME]"
 )
-@click.option("--knobs", metavar="NAME,...", help="Turns these alone, such as shading,storage. [default: all of them]")
+@click.option("--knobs", metavar="NAME,...", help="Varies only these knobs, such as shading,storage. [default: all]")
 @click.option(
     "--metric",
     type=click.Choice(["max_abs", "rmse", "p999", "codes", "flip"]),
     default="max_abs",
     show_default=True,
-    help="Of the front that is printed, and that the page begins with.",
+    help="Measure of error for the front that is printed, and with which the page begins.",
 )
-@click.option("--repeat", type=click.IntRange(1, 1000), help="Timings of each setting, taken in turn. [default: 15]")
+@click.option("--repeat", type=click.IntRange(1, 1000), help="Number of timings of each setting. [default: 15]")
 @click.option("--size", type=Size(), help="Overrides the film's size [pixels].")
 @overrides
-@click.option("--again", is_flag=True, help="Measures anew what the folder holds already.")
-@click.option("--backend", type=click.Choice(["auto", "egl", "osmesa", "standalone"]), default="auto", show_default=True)
-@click.option("--device", type=int, help="EGL device, as `glshade devices` counts them.")
-@click.option("--json", "as_json", is_flag=True, help="All points as JSON on stdout, in place of the tables.")
+@click.option("--again", is_flag=True, help="Repeats the measurements that the folder already holds.")
+@driver
+@shaders
+@models
+@click.option("--json", "as_json", is_flag=True, help="Prints all settings as JSON instead of the tables.")
 def command(
     scene: Path,
     output: Path | None,
@@ -50,12 +53,17 @@ def command(
     again: bool,
     backend: Any,
     device: int | None,
+    shaders: tuple[str, ...],
+    models: tuple[str, ...],
     as_json: bool,
 ) -> None:
-    """Draws SCENE at every setting that makes a difference; measures time and error, told apart by kind; finds the front.
+    """Measures time and error of SCENE's settings.
 
-    Writes a folder: index.html with everything in it, tradeoff.json, tradeoff.csv, pictures/, and measured.json, from which
-    the same command takes up work that was interrupted.
+    Draws SCENE at every setting that makes a difference, and finds the Pareto front of time and error. Errors
+    are measured by kind: model, sampling, arithmetic and storage.
+
+    The command writes a folder with index.html (which contains everything), tradeoff.json, tradeoff.csv, pictures/, and
+    measured.json, from which the same command continues after an interruption.
     """
     from glshade.cli import _table
     from glshade.errors import GlshadeError
@@ -77,26 +85,26 @@ def command(
     from glshade.tradeoff import page
     from glshade.tradeoff.study import study
 
-    with Renderer(backend, device) as renderer:
+    with Renderer(backend, device, shaders=shaders) as renderer:
         try:
             with _progress() as progress:
-                found = study(
+                result = study(
                     loaded, renderer, name=scene.stem, knobs=wanted, repeat=repeat or REPEAT, kept=kept, progress=progress
                 )
         except KeyboardInterrupt:
             if kept.is_file():
-                click.echo(f"glshade: {kept} holds what is measured; the same command takes it up", err=True)
+                click.echo(f"glshade: {kept} holds the measurements so far; the same command continues from them", err=True)
             raise
-        written = page.write(folder, found, loaded, renderer, metric)
+        written = page.write(folder, result, loaded, renderer, metric)
     if as_json:
-        _table.as_json(found.as_dict())
+        _table.as_json(result.as_dict())
         return
-    _print(found, metric)
+    _print(result, metric)
     click.echo(f"page: {written}")
 
 
 def _knobs(text: str | None) -> tuple[str, ...]:
-    """The names; all stand for none. Errors: click.BadParameter with the nearest."""
+    """Returns the names in a text such as shading,storage. Errors: click.BadParameter for an unknown knob."""
     from dataclasses import fields
 
     from glshade.document import nearest
@@ -111,49 +119,54 @@ def _knobs(text: str | None) -> tuple[str, ...]:
 
 
 def _print(study: Study, metric: str) -> None:
-    """The front, then what dominates each of the others, then the choices that change nothing."""
+    """Prints the front, then each dominated setting with one that dominates it, then the values that change nothing."""
     from glshade.cli import _table
-    from glshade.tradeoff.page import milliseconds, ranks, reason, shown
+    from glshade.tradeoff.page import error_text, milliseconds, ranks, reason
     from glshade.tradeoff.setting import KINDS
 
     points, dominators, front = study.points, study.front(metric), ranks(study, metric)
     width, height = study.size
     click.echo(f"{study.driver}; {width}x{height} pixels, {study.counted:.2%} of them counted")
-    click.echo(f"{len(points)} settings, {len(front)} on the front of time and {metric}; errors by kind, which do not add up")
+    click.echo(
+        f"{len(points)} settings, {len(front)} on the front of time and {metric}; the errors by kind do not add up to the total"
+    )
     rows = []
     for rank in front:
         p, t = points[rank.index], points[rank.index].timing
         rows.append(
             [
-                *("tie" if rank.tie else str(rank.number), str(p.setting)),
-                *(milliseconds(t.median), f"{milliseconds(t.low)} to {milliseconds(t.high)}", shown(p.error(metric), metric)),
-                *(shown(getattr(p.by_kind[kind], metric), metric) for kind in KINDS),
+                "tie" if rank.tie else str(rank.number),
+                str(p.setting),
+                milliseconds(t.median),
+                f"{milliseconds(t.low)} to {milliseconds(t.high)}",
+                error_text(p.error(metric), metric),
+                *(error_text(getattr(p.by_kind[kind], metric), metric) for kind in KINDS),
             ]
         )
     _table.table(["", "setting", "ms", "range", metric, *KINDS], rows)
-    click.echo(f"floor, from rounding the inputs: {shown(getattr(study.floor, metric), metric)}")
+    click.echo(f"error from rounding the inputs to float32 alone: {error_text(getattr(study.floor, metric), metric)}")
     for i in sorted(range(len(points)), key=lambda i: points[i].timing.median):
-        by = dominators[i]
-        if by is not None:
+        dominator = dominators[i]
+        if dominator is not None:
             p = points[i]
-            own = f"{milliseconds(p.timing.median)} ms, {shown(p.error(metric), metric)}"
-            click.echo(f"{p.setting} ({own}): dominated by {points[by].setting}, {reason(p, points[by], metric)}")
+            own = f"{milliseconds(p.timing.median)} ms, {error_text(p.error(metric), metric)}"
+            click.echo(f"{p.setting} ({own}): dominated by {points[dominator].setting}, {reason(p, points[dominator], metric)}")
     for choice, proof in study.inert.items():
         click.echo(f"{choice} changes nothing: {proof}")
 
 
 @contextmanager
 def _progress() -> Iterator[Progress]:
-    """A bar on a terminal, else a line now and then; on stderr."""
+    """A context manager that yields a function to show progress on stderr: a bar on a terminal, elsewhere up to PARTS lines."""
     import sys
 
     if not sys.stderr.isatty():
-        told = 0
+        printed = 0
 
         def line(what: str, done: int, total: int) -> None:
-            nonlocal told
-            if done * PARTS // total > told:
-                told = done * PARTS // total
+            nonlocal printed
+            if done * PARTS // total > printed:
+                printed = done * PARTS // total
                 click.echo(f"glshade: {done} of {total} settings measured, the last: {what}", err=True)
 
         yield line
@@ -163,6 +176,6 @@ def _progress() -> Iterator[Progress]:
 
     columns = (BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(), TextColumn("{task.description}"))
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        # What makes no difference is found before anything is measured.
+        # The number of settings is unknown at first: the study begins by dropping settings that make no difference.
         task = bar.add_task("settings that make a difference", total=None)
         yield lambda what, done, total: bar.update(task, description=what, completed=done, total=total)

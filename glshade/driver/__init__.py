@@ -1,1 +1,1 @@
-"""Driver: what the OpenGL driver at hand does and what it costs, by measurement."""
+"""Driver: measures the OpenGL driver at hand: its arithmetic, pixel formats and rasteriser, and the cost of programs."""

@@ -1,8 +1,9 @@
-"""Census: the operations of a program's stages, counted in the driver's own intermediate code.
+"""Census: counts the operations of a program's stages in the driver's own intermediate code.
 
-Mesa's Gallium drivers (llvmpipe, radeonsi, iris, zink and others) print the NIR of a stage, linked and optimised, when the
-environment variable ST_DEBUG asks for it, in release builds too. It is read once when a driver is loaded, so the programs are
-compiled in a process of their own. Other drivers say nothing.
+NIR is the intermediate code of Mesa's compiler. Mesa's Gallium drivers (llvmpipe, radeonsi, iris, zink and others) print the
+NIR of a stage after linking and optimisation if the environment variable ST_DEBUG asks for it, in release builds too. They read
+the variable only once, when the driver is loaded. So the programs are compiled in a process of their own. Other drivers print
+nothing.
 """
 
 from __future__ import annotations
@@ -14,19 +15,23 @@ import subprocess
 import sys
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
+
+from glshade.errors import ContextError, GlshadeError, ShaderError
 
 if TYPE_CHECKING:
     from glshade.gl.context import Backend
-    from glshade.glsl.generator import Source
+    from glshade.glsl.explanation import Explained, Explanation
+    from glshade.glsl.source import Source
 
-# Without the cache on disk: what comes from there is not compiled, and need not be printed.
+# Mesa's cache on disk is turned off, because a program from the cache is not compiled and may not be printed.
 ENVIRONMENT = {"ST_DEBUG": "nir", "MESA_SHADER_CACHE_DISABLE": "true"}
-# A start, a context and a few hundred programs; a driver that hangs is given up.
+# Timeout of the process that compiles programs [s]. A few hundred programs take much less.
 SECONDS = 300
 
-# kind -> NIR's operations, as regular expressions of the whole name without the size at its end ("flt32" is "flt").
+# kind -> a regular expression for the names of its operations in NIR. It matches the whole name without the size in bits, such
+# as "flt" for "flt32".
 KINDS: Mapping[str, str] = {
     "add": "fadd|fsub|fsum.*",
     "mul": "fmul|fmulz",
@@ -40,13 +45,14 @@ KINDS: Mapping[str, str] = {
     "|[iu]bfe|bitfield.*|extract.*|insert.*|find.*|bit_count",
     "other": ".*",
 }
-# Cost nothing, or ride on another operation.
+# These operations cost nothing or are folded into another one.
 FREE = re.compile(r"mov|vec\d+|fneg|fabs|fcanonicalize|(un)?pack_.*|load_const|(ssa_)?undef(ined)?")
 _KINDS = {kind: re.compile(names) for kind, names in KINDS.items()}
 
-# `vec3 32 ssa_7 = fmul ...` to Mesa 22, `div 32x3  %7 = fmul ...` since.
+# A line of an operation looks like `vec3 32 ssa_7 = fmul ...` up to Mesa 22, and like `div 32x3  %7 = fmul ...` in later
+# versions.
 _SIZE = r"(?:(?:con|div)\s+)?(?:vec(?P<old>\d+)\s+)?\d+(?:x(?P<new>\d+))?\s+"
-_VALUE = re.compile(rf"^\s*(?:{_SIZE})?(?:ssa_|%|r)\d+.*?\s=\s+(?P<what>.*)$")
+_VALUE = re.compile(rf"^\s*(?:{_SIZE})?(?:ssa_|%|r)\d+.*?\s=\s+(?P<operation>.*)$")
 _TEXTURE = re.compile(r"^\([a-z]+\d+\)\s*(?P<name>\w+)")
 _DOT = re.compile(r"fdot(\d+)")
 _STAGE = re.compile(r"^shader: MESA_SHADER_(?P<name>\w+)")
@@ -55,11 +61,14 @@ _MARK = "census of program "
 
 @dataclass(frozen=True)
 class Operations:
-    """What a stage's text asks for, each component of a vector counted. A loop's body counts once.
+    """The operations of a stage. Each component of a vector counts as one operation. The body of a loop is counted once.
 
-    arithmetic: kind -> count, in the order of KINDS; div has reciprocals, sqrt inverse roots, exp the logarithm, power, sine
-    and cosine, select every comparison, minimum and maximum, int conversions, other rounding and the like. Negations and
-    absolute values are free.
+    arithmetic: kind -> count, in the order of KINDS. "div" includes reciprocals; "sqrt" includes inverse roots; "exp" includes
+        logarithms, powers, sines and cosines; "select" includes comparisons, minima and maxima; "int" includes conversions.
+        "other" counts rounding and all operations of no other kind. Negations and absolute values are not counted.
+    textures: the number of texture lookups.
+    branches: the number of if statements.
+    loops: the number of loops.
     """
 
     arithmetic: Mapping[str, int] = field(default_factory=lambda: dict.fromkeys(KINDS, 0))
@@ -69,7 +78,7 @@ class Operations:
 
     @property
     def total(self) -> int:
-        """All arithmetic."""
+        """The number of arithmetic operations of all kinds."""
         return sum(self.arithmetic.values())
 
     def __sub__(self, other: Operations) -> Operations:
@@ -78,7 +87,7 @@ class Operations:
         return Operations(kinds, *rest)
 
     def as_dict(self) -> dict[str, int]:
-        """For JSON: kind -> count, and their total."""
+        """Returns the counts ready for JSON: kind -> count, then textures, branches, loops and the total of all kinds."""
         rest = {"textures": self.textures, "branches": self.branches, "loops": self.loops}
         return {**self.arithmetic, **rest, "total": self.total}
 
@@ -89,63 +98,60 @@ class Operations:
 
 @dataclass(frozen=True)
 class Census:
-    """The operations of a program. A stage that the program has not is None."""
+    """The operations of a program.
+
+    vertex: the operations of the vertex stage; None if the program has no such stage.
+    fragment: the operations of the fragment stage; None if the program has no such stage.
+    """
 
     vertex: Operations | None
     fragment: Operations | None
 
     def as_dict(self) -> dict[str, dict[str, int] | None]:
-        """For JSON."""
+        """Returns the census ready for JSON: stage -> counts, or None."""
         return {
             stage: None if found is None else found.as_dict()
             for stage, found in (("vertex", self.vertex), ("fragment", self.fragment))
         }
 
 
-def census(source: Source, backend: Backend = "auto", device: int | None = None) -> Census | None:
-    """The operations of one program; None where the driver shows nothing. A process is started for it: see `censuses`."""
-    return censuses([source], backend, device)[0]
-
-
 def censuses(sources: Sequence[Source], backend: Backend = "auto", device: int | None = None) -> list[Census | None]:
-    """The same of many programs, from one process.
+    """Returns the census of each program; None for programs about which the driver prints nothing.
 
-    backend, device: as of `open_context`. Errors: ShaderError for a source that does not compile, ContextError,
-    GlshadeError where the process ends otherwise.
+    One process compiles all programs.
+    backend, device: the arguments of `open_context`.
+    Errors: ShaderError for a source that does not compile; ContextError; GlshadeError if the process fails otherwise.
     """
-    from glshade.errors import ContextError, GlshadeError, ShaderError
-
     command = [sys.executable, "-m", "glshade.driver.census"]
     given = pickle.dumps((list(sources), backend, device))
     try:
         done = subprocess.run(command, input=given, capture_output=True, env={**os.environ, **ENVIRONMENT}, timeout=SECONDS)
     except subprocess.TimeoutExpired:
-        raise GlshadeError(f"the driver took more than {SECONDS} s to show what it makes of the programs") from None
+        raise GlshadeError(f"the driver took more than {SECONDS} s to compile the programs") from None
     if done.returncode:
-        kinds = {4: ShaderError, 5: ContextError}
+        error = {4: ShaderError, 5: ContextError}.get(done.returncode, GlshadeError)
         message = done.stdout.decode(errors="replace").strip()
-        kind = kinds.get(done.returncode, GlshadeError)
-        raise kind(message or f"no census: the process that compiles ended with exit code {done.returncode}")
-    # What stands before the first mark belongs to no program: drivers compile some of their own.
+        raise error(message or f"the process that compiles programs ended with exit code {done.returncode}")
+    # The text before the first mark is about programs that the driver itself uses.
     parts = done.stderr.decode(errors="replace").split(_MARK)[1:]
     return [count(part) for part in parts]
 
 
 def count(printed: str) -> Census | None:
-    """The operations of what a Gallium driver printed of one program; None where that is nothing."""
+    """Counts the operations in the text that a Gallium driver printed about one program. Returns None if it has no stage."""
     stages: dict[str, Operations] = {}
     for name, lines in _stages(printed):
-        # Of several variants of a stage the first is the one that the program was linked to.
+        # A driver may print variants of a stage later. The first text of a stage is that of the linked program.
         stages.setdefault(name, _operations(lines))
     return Census(stages.get("VERTEX"), stages.get("FRAGMENT")) if stages else None
 
 
 def _stages(printed: str) -> Iterator[tuple[str, list[str]]]:
-    """(name, lines) of each stage that is printed."""
+    """Yields (name, lines) of each stage in the text."""
     name, lines = "", list[str]()
     for line in printed.splitlines():
         head = _STAGE.match(line)
-        # A driver without NIR is handed something else, printed after it.
+        # For a driver that does not accept NIR, Mesa translates the NIR to TGSI and prints that after the stage.
         if head or line.startswith("TGSI"):
             if name:
                 yield name, lines
@@ -165,11 +171,11 @@ def _operations(lines: list[str]) -> Operations:
         value = _VALUE.match(line)
         if value is None:
             continue
-        if _TEXTURE.match(value["what"]):
+        if _TEXTURE.match(value["operation"]):
             textures += 1
             continue
-        # Without the marks of exactness: "fadd!", "fmul.nsz".
-        name = re.split(r"[!.\s]", value["what"], maxsplit=1)[0]
+        # A name may end in a mark about exactness, as in "fadd!" and "fmul.nsz". The mark is removed.
+        name = re.split(r"[!.\s]", value["operation"], maxsplit=1)[0]
         width = int(value["old"] or value["new"] or 1)
         if name in {"intrinsic", "phi", "deref_var", "deref_array", "deref_struct"} or name.startswith(("@", "deref")):
             continue
@@ -183,14 +189,26 @@ def _operations(lines: list[str]) -> Operations:
 
 
 def _kind(name: str) -> str:
-    """The kind of an operation by its name in NIR."""
+    """Returns the kind of an operation with that name in NIR."""
     bare = re.sub(r"(?<=[a-z])(1|8|16|32|64)$", "", name)
     return next(kind for kind, names in _KINDS.items() if names.fullmatch(bare) or names.fullmatch(name))
 
 
+def with_operations(found: Explanation, backend: Backend = "auto", device: int | None = None) -> Explanation:
+    """Returns the explanation with the operations of each program, if the driver prints them. Errors: as for `censuses`."""
+    counted = censuses([program.source for program in found.programs], backend, device)
+
+    def completed(program: Explained, operations: Census | None) -> Explained:
+        return replace(program, operations=operations.as_dict() if operations else None)
+
+    return replace(found, programs=tuple(map(completed, found.programs, counted)))
+
+
 def _child() -> int:
-    """Compiles what comes through stdin; the driver prints on stderr, between marks."""
-    from glshade.errors import GlshadeError
+    """Compiles the programs that come through stdin, and returns the exit code.
+
+    The driver prints the operations to stderr. This function prints a mark there before each program.
+    """
     from glshade.gl.context import open_context
     from glshade.gl.program import Program
 
@@ -198,7 +216,7 @@ def _child() -> int:
     try:
         context = open_context(backend, device)
         for number, source in enumerate(sources):
-            # Straight to the file, as the driver prints.
+            # The driver writes to the file descriptor directly. A mark in a buffer of Python would come too late.
             os.write(2, f"\n{_MARK}{number}\n".encode())
             Program(context, source)
         context.release()

@@ -1,68 +1,75 @@
-"""Workload: a program drawn so often that its time is that of the function in the middle of it."""
+"""Workload: times a function by draws in which it runs so often that all other costs of the draw do not matter."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import moderngl
 import numpy as np
 
 from glshade.driver.clock import Spread, difference, seconds
 from glshade.gl.context import Context
 from glshade.gl.program import Program
-from glshade.glsl.generator import Source
+from glshade.gl.screen import Capture, Screen
+from glshade.glsl.source import Source
 
-# A square of pixels, and as many vertices: enough for every unit of a large GPU, little enough for one core.
+# The side of the screen [pixels], and the number of vertices. They are large enough to occupy every unit of a large GPU, and
+# small enough for a single CPU core.
 SIDE = 256
 VERTICES = 16384
-# The rounds are doubled until a draw of the program that is taken off takes this long [s]: many times what starting one takes.
+# The number of rounds is doubled until a draw of the empty program takes this long [s], many times the cost of starting a draw.
 LEAST = 2e-3
-# llvmpipe stops loops after 65,535 rounds, without a word.
+# llvmpipe ends loops after 65,535 rounds and reports nothing.
 MOST_ROUNDS = 32768
-# Added to a direction each round; float32 does not notice.
+# The number that is added to a direction in each round. It is so small that float32 rounds the sum to the same direction.
 DRIFT = 1e-9
 
 
 class Workload:
-    """One stage, "fragment" or "vertex": draws with many evaluations at each place (shaders/lib/evaluations.glsl).
+    """Draws that evaluate a model many times at each pixel or vertex (shaders/driver/evaluations.glsl).
 
-    without: the program that is taken off the others' times. rounds: evaluations a pixel or vertex.
+    places: the number of pixels or vertices.
+    rounds: the number of evaluations at each of them.
+    without: a function that draws the empty program. Its time is subtracted from the time of the other draws.
     """
 
     def __init__(self, context: Context, stage: str, without: Source) -> None:
+        """Chooses the number of rounds.
+
+        stage: the stage that evaluates the model, "fragment" or "vertex".
+        without: the empty program, which has an empty function in the place of the model.
+        Errors: ShaderError, ContextError.
+        """
         self.context, self.stage = context, stage
-        gl = context.gl
-        self.places = SIDE * SIDE if stage == "fragment" else VERTICES
-        # Without a framebuffer bound, llvmpipe's vertex stage writes zeros and says nothing.
-        self.target = gl.framebuffer([gl.texture((SIDE, SIDE), 4, dtype="f4")])
-        self.captured = gl.buffer(reserve=12 * VERTICES)
-        self.without = self._drawing(without, {})
+        in_pixels = stage == "fragment"
+        self.places = SIDE * SIDE if in_pixels else VERTICES
+        self._target = Screen(context, (SIDE, SIDE)) if in_pixels else Capture(context, VERTICES, 3)
         self.rounds = 16
+        self.without = self._drawing(without, {})
         while self.rounds < MOST_ROUNDS and min(seconds(context, self.without) for _ in range(2)) < LEAST:
             self.rounds *= 2
 
     def _drawing(self, source: Source, values: Mapping[str, Any]) -> Callable[[], None]:
-        gl = self.context.gl
-        program = Program(self.context, source, varyings=("v_value",) * (self.stage == "vertex"))
+        """Returns a function that draws the program. values: name of a uniform without u_ -> its value, a float32 array."""
+        varyings = ("v_value",) if self.stage == "vertex" else ()
+        program = Program(self.context, source, varyings)
         for name, value in values.items():
             program.write(f"u_{name}", value)
         program.write("u_drift", np.full(3, DRIFT, dtype=np.float32))
-        array = gl.vertex_array(program.gl, [])
 
         def draw() -> None:
             program.set_integer("u_count", self.rounds)
-            self.target.use()
-            if self.stage == "vertex":
-                array.transform(self.captured, moderngl.POINTS, vertices=VERTICES)
-            else:
-                gl.enable_only(moderngl.NOTHING)
-                array.render(moderngl.TRIANGLES, vertices=3)
+            self._target.draw(program)
 
         return draw
 
     def nanoseconds(self, source: Source, values: Mapping[str, Any], repeat: int) -> Spread:
-        """[ns] an evaluation; values: of its uniforms, without the u_."""
-        took = difference(self.context, self._drawing(source, values), self.without, repeat)
+        """Returns the time of one evaluation of the model [ns], as the spread of `repeat` measurements.
+
+        source: the program with the model.
+        values: name of a uniform without u_ -> its value, a float32 array.
+        Errors: ShaderError.
+        """
+        spread = difference(self.context, self._drawing(source, values), self.without, repeat)
         scale = 1e9 / (self.places * self.rounds)
-        return Spread(took.median * scale, took.low * scale, took.high * scale)
+        return Spread(spread.median * scale, spread.low * scale, spread.high * scale)

@@ -1,1 +1,1 @@
-"""The only rooms that speak to OpenGL: context, program, vertices, textures, frame, renderer."""
+"""GL: the renderer on OpenGL. This is the only package that calls OpenGL: contexts, programs, vertices, textures and frames."""

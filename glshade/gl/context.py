@@ -1,7 +1,8 @@
-"""Context: an OpenGL context without a window, with the calls that moderngl does not wrap.
+"""Context: OpenGL contexts without a window, and access to GL functions that moderngl does not wrap.
 
-On Linux through EGL (`libEGL.so.1` by its versioned name: machines without development packages have no other). Elsewhere
-`auto` falls back to moderngl's own standalone context. Without EGL, Mesa's OSMesa serves (osmesa.py); one backend a process.
+On Linux, contexts are made with EGL; the library is loaded as `libEGL.so.1`, because the unversioned name exists only where
+development packages are installed. Without EGL, `auto` falls back to Mesa's OSMesa (osmesa.py). On other systems `auto` takes
+moderngl's own standalone context. One process can use only one backend.
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
 Backend = Literal["auto", "egl", "osmesa", "standalone"]
 BACKENDS: tuple[Backend, ...] = ("auto", "egl", "osmesa", "standalone")
 LIBEGL = "libEGL.so.1"
+# OpenGL 3.3, in moderngl's notation.
 REQUIRED_VERSION = 330
 
 # Khronos' registry values (gl.xml, egl.xml).
@@ -32,12 +34,21 @@ GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T = 0x0DE1, 0x2802, 0x2803
 EGL_VENDOR, EGL_VERSION, EGL_EXTENSIONS = 0x3053, 0x3054, 0x3055
 EGL_PLATFORM_DEVICE_EXT = 0x313F
 
+# Parts of the GL_RENDERER strings, in lower case, of renderers that run on the CPU.
+SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "software rasterizer")
+
 ADVICE = "install a driver (Debian, Ubuntu: apt install libegl1 libgl1-mesa-dri), then see `glshade doctor`"
 
 
 @dataclass(frozen=True)
 class Device:
-    """One of EGL's devices; index is what `--device` takes."""
+    """One of EGL's devices.
+
+    index: its number in EGL's list, which `--device` takes.
+    vendor: EGL_VENDOR.
+    version: EGL_VERSION.
+    extensions: the names of its device extensions.
+    """
 
     index: int
     vendor: str
@@ -46,19 +57,21 @@ class Device:
 
     @property
     def is_software(self) -> bool:
-        """Whether the device is the CPU."""
+        """Whether the device renders on the CPU."""
         return "EGL_MESA_device_software" in self.extensions
 
 
-# The backends that this process has had contexts of.
+# The backends on which this process has opened contexts.
 _opened: set[str] = set()
 
 
 class Context:
-    """An OpenGL context, made current.
+    """An OpenGL context. It is current after its creation.
 
-    gl: moderngl's. zero_to_one: whether clip z runs from 0 to 1, which reversed float depth needs to be worth its name.
-    linker: makes programs from what is kept on disk; None where that is off or the driver offers no binaries.
+    gl: moderngl's context.
+    backend: egl, osmesa or standalone.
+    linker: loads programs from the disk cache; None if the cache is off or the driver offers no program binaries.
+    zero_to_one: whether clip z runs from 0 to 1. Reversed float depth gains precision only with this range.
     """
 
     def __init__(
@@ -66,11 +79,11 @@ class Context:
     ) -> None:
         self.gl, self.backend, self.linker = gl, backend, linker
         self._procedure = procedure
-        # What Python forgets is kept aside until gc() is called with this context current: the same number may be a
-        # living object of another context.
+        # Only gc() deletes the GL objects that Python no longer uses, and it runs while this context is current. In another
+        # context the same number may name an object that is in use.
         gl.gc_mode = "context_gc"
         self._released = False
-        # Asked now: while another context is current there is no answer, and moderngl would remember that.
+        # The info is read now, while the context is current. Later it may be empty, and moderngl would cache the empty info.
         self._info = gl.info
         clip_control = self.procedure("glClipControl", None, ctypes.c_uint, ctypes.c_uint)
         self.zero_to_one = clip_control is not None and (gl.version_code >= 450 or "GL_ARB_clip_control" in gl.extensions)
@@ -79,48 +92,55 @@ class Context:
 
     @property
     def renderer(self) -> str:
-        """GL_RENDERER."""
+        """The driver's GL_RENDERER string."""
         return str(self._info["GL_RENDERER"])
 
     @property
     def version(self) -> str:
-        """GL_VERSION."""
+        """The driver's GL_VERSION string."""
         return str(self._info["GL_VERSION"])
 
     @property
     def is_software(self) -> bool:
-        """Whether the driver draws with this process' own threads."""
-        return any(name in self.renderer for name in ("llvmpipe", "softpipe", "SwiftShader"))
+        """Whether the driver renders on the CPU."""
+        return any(name in self.renderer.lower() for name in SOFTWARE)
 
     @property
     def passed_vectors(self) -> int:
-        """How many vectors go from the vertex to the fragment stage; OpenGL 3.3 promises 15."""
+        """The number of vectors that the vertex stage can pass to the fragment stage; OpenGL 3.3 guarantees 15."""
         return int(self._info.get("GL_MAX_VARYING_VECTORS", 15))
 
     @property
     def largest_side(self) -> int:
-        """The largest picture that the driver draws in one piece [pixels]."""
+        """The largest width and height of a frame [pixels]."""
         info = self._info
         return int(min(info["GL_MAX_TEXTURE_SIZE"], info["GL_MAX_RENDERBUFFER_SIZE"], *info["GL_MAX_VIEWPORT_DIMS"]))
 
     def procedure(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any] | None:
-        """A GL function that moderngl does not wrap; None where the driver has none."""
+        """A GL function that moderngl does not wrap; None if the driver does not have it.
+
+        name: the name of the function.
+        result: the ctypes type of its result; None if it returns nothing.
+        arguments: the ctypes types of its arguments.
+        """
         address = self._procedure(name)
         return ctypes.CFUNCTYPE(result, *arguments)(address) if address else None
 
     def release(self) -> None:
-        """Gives everything back to the driver. Twice is once."""
+        """Destroys the context and all of its objects. A second call does nothing."""
         if not self._released:
             self._released = True
             self.gl.release()
 
 
 def open_context(backend: Backend = "auto", device: int | None = None, program_cache: bool | None = None) -> Context:
-    """A new context on the backend and EGL device.
+    """Opens a new context, which is current afterwards.
 
-    program_cache: whether linked programs are kept on disk; left out, they are unless GLSHADE_PROGRAM_CACHE is "0". The
-    window system's context (standalone) has no such cache.
-    Errors: ContextError with what failed and what to do.
+    backend: auto, egl, osmesa or standalone.
+    device: optional; the index of an EGL device.
+    program_cache: optional; whether linked programs are cached on disk. Default: they are, unless the environment variable
+        GLSHADE_PROGRAM_CACHE is "0". A standalone context never has this cache.
+    Errors: ContextError, which names the failure and its remedy.
     """
     if backend not in BACKENDS:
         raise ContextError(f"unknown backend {backend!r}; allowed: {', '.join(BACKENDS)}")
@@ -148,13 +168,13 @@ def open_context(backend: Backend = "auto", device: int | None = None, program_c
 
 def _open_egl(device: int | None, cached: bool) -> Context:
     egl = load_egl()
-    # glcontext wants a libGL to look symbols up in; EGL's own library serves, and bare machines have no libGL.
+    # glcontext looks up GL symbols in a libGL. EGL's own library serves as well, and minimal machines have no libGL.
     options: dict[str, Any] = {"mode": "standalone", "libegl": LIBEGL, "libgl": LIBEGL, "glversion": REQUIRED_VERSION}
     if device is not None:
         options["device_index"] = device
     try:
         window = glcontext.get_backend_by_name("egl")(**options)
-        gl, linker = _made(window, "egl", cached)
+        gl, linker = _wrapped(window, "egl", cached)
     except Exception as error:
         if device is not None:
             count = len(devices())
@@ -172,8 +192,12 @@ def _open_egl(device: int | None, cached: bool) -> Context:
 
 
 def _open_osmesa(cached: bool, instead_of: ContextError | None = None) -> Context:
-    """instead_of: what is raised where OSMesa is not to be had either."""
-    # EGL's context stays entangled with the thread; entering OSMesa afterwards crashes in the driver.
+    """Opens an OSMesa context.
+
+    cached: whether linked programs are cached on disk.
+    instead_of: optional; the error of EGL, which is raised in place of OSMesa's own if OSMesa is not available either.
+    """
+    # An EGL context leaves state in its thread; making an OSMesa context current afterwards crashes the driver.
     if "egl" in _opened:
         raise instead_of or ContextError("this process has used EGL already; OSMesa needs a process of its own")
     from glshade.gl.osmesa import OSMesa
@@ -183,15 +207,15 @@ def _open_osmesa(cached: bool, instead_of: ContextError | None = None) -> Contex
     except ContextError as error:
         raise instead_of or error from None
     try:
-        gl, linker = _made(own, "osmesa", cached)
+        gl, linker = _wrapped(own, "osmesa", cached)
     except Exception as error:
         raise ContextError(f"OSMesa gives no OpenGL {REQUIRED_VERSION / 100:.1f} context ({error})") from None
     _opened.add("osmesa")
     return Context(gl, "osmesa", own.load_opengl_function, linker)
 
 
-def _made(window: Any, backend: str, cached: bool) -> tuple[moderngl.Context, Linker | None]:
-    """moderngl's context in the window, and the linker between them where there is one."""
+def _wrapped(window: Any, backend: str, cached: bool) -> tuple[moderngl.Context, Linker | None]:
+    """A moderngl context around a context of glcontext or OSMesa, and the linker between them, or None without a linker."""
     linker = None
     if cached:
         from glshade.gl.binaries import Binaries
@@ -205,7 +229,7 @@ def _made(window: Any, backend: str, cached: bool) -> tuple[moderngl.Context, Li
 
 
 def load_egl() -> ctypes.CDLL:
-    """The EGL library. Errors: ContextError where it is missing."""
+    """The EGL library. Errors: ContextError if it is missing."""
     try:
         return ctypes.CDLL(LIBEGL)
     except OSError as error:
@@ -213,7 +237,7 @@ def load_egl() -> ctypes.CDLL:
 
 
 def devices() -> list[Device]:
-    """EGL's devices in its own order. Errors: ContextError without EGL or without its device extensions."""
+    """The EGL devices, in EGL's order. Errors: ContextError without EGL or without its device extensions."""
     egl = load_egl()
     egl.eglGetProcAddress.restype = ctypes.c_void_p
     egl.eglQueryString.restype = ctypes.c_char_p

@@ -1,4 +1,4 @@
-"""evaluate: the shader unit test. One reflectance model at given directions, on the CPU in float64 or on the GPU in float32."""
+"""Evaluation: `evaluate`, which computes one reflectance model at given directions, in float64 on the CPU or in a GPU stage."""
 
 from __future__ import annotations
 
@@ -8,22 +8,41 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from glshade.brdfs import BRDFS, Brdf, numbers, widened
+from glshade.brdfs import Brdf, numbers, widened
 from glshade.gl.context import Context, open_context
 from glshade.gl.program import Program
-from glshade.glsl.generator import Source, expand
+from glshade.glsl.generator import model_code
+from glshade.glsl.shaders import Shaders, current, expand
+from glshade.glsl.source import Code, Source
+from glshade.glsl.uniforms import Values
+from glshade.scene.models import Folders, paths, use_models
 
 On = Literal["reference", "vertex", "fragment"]
 
 
-def evaluate(brdf: Brdf, l: ArrayLike, v: ArrayLike, on: On = "reference", context: Context | None = None) -> NDArray[Any]:
-    """f cos [1/sr] of a model, (..., 3).
+def evaluate(
+    brdf: Brdf,
+    l: ArrayLike,
+    v: ArrayLike,
+    on: On = "reference",
+    context: Context | None = None,
+    *,
+    shaders: Folders | None = None,
+    models: Folders | None = None,
+) -> NDArray[Any]:
+    """The values f cos (..., 3) of a model [1/sr], where f is its BRDF and cos the cosine between the normal and l.
 
-    brdf: a model with its parameters, e.g. Phong(kd=0.5), none of them a texture. l, v (..., 3): unit directions to the light
-    and to the viewer in the local frame (n = +z, t = +x), rounded to float32 first. on: "reference" in float64, or in the GPU's
-    "vertex" (transform feedback) or "fragment" stage. context: left out, one is made for the call.
-    Errors: ValueError, ContextError, ShaderError.
+    brdf: a model with its parameters, for example Phong(kd=0.5); none of them may be a texture.
+    l: unit directions (..., 3) to the light, of any leading shape, in the local frame, where the normal is +z and the tangent
+        is +x. They are first rounded to float32.
+    v: unit directions (..., 3) to the viewer in the same frame, rounded in the same way. l and v are broadcast to one shape.
+    on: "reference" for float64 on the CPU; "vertex" or "fragment" for float32 in that stage on the GPU.
+    context: optional; the context to use. Default: a new one for this call.
+    shaders: optional; the user's shader folders, as for Renderer.
+    models: optional; the user's model folders, as for Renderer.
+    Errors: ValueError, ContextError, ShaderError, SceneError.
     """
+    use_models(models)
     l, v = np.broadcast_arrays(np.asarray(l, dtype=np.float32), np.asarray(v, dtype=np.float32))
     if l.shape[-1:] != (3,):
         raise ValueError(f"l and v must have shape (..., 3), not {l.shape}")
@@ -39,30 +58,26 @@ def evaluate(brdf: Brdf, l: ArrayLike, v: ArrayLike, on: On = "reference", conte
     try:
         stage = _in_vertex_stage if on == "vertex" else _in_fragment_stage
         with opened.gl:
-            flat = stage(opened, brdf, values, l.reshape(-1, 3), v.reshape(-1, 3))
+            flat = stage(opened, current(paths(shaders)), brdf, values, l.reshape(-1, 3), v.reshape(-1, 3))
+            # This frees the program, textures and buffers of the call.
+            opened.gl.gc()
         return flat.reshape(l.shape)
     finally:
         if context is None:
             opened.release()
 
 
-def generated(brdf: Brdf) -> dict[str, str]:
-    """The model's include, its uniforms, and `value(l, v)`."""
-    struct = BRDFS.class_name(brdf.brdf)
-    text = f'#include "brdf/{brdf.brdf}.glsl"\n'
-    names = list(brdf.parameters())
-    for name in names:
-        text += f"uniform {'vec3' if brdf.is_colour(name) else 'float'} u_{name};\n"
-    arguments = ", ".join(f"u_{name}" for name in names)
-    frame = "Frame(vec3(0.0, 0.0, 1.0), vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0))"
-    text += f"\nvec3 value(vec3 l, vec3 v) {{\n    return brdf_cos({struct}({arguments}), {frame}, l, v);\n}}\n"
-    return {**brdf.slots(), "model": text}
+def generated(brdf: Brdf) -> dict[str, Code]:
+    """Place -> code, for a program that evaluates a model. In the local frame, `vec3 value(vec3 l, vec3 v)` returns f cos."""
+    return model_code(
+        brdf, "vec3 value(vec3 l, vec3 v)", "Frame(vec3(0.0, 0.0, 1.0), vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0))"
+    )
 
 
 def _in_vertex_stage(
-    context: Context, brdf: Brdf, values: dict[str, NDArray[np.float32]], l: NDArray[Any], v: NDArray[Any]
+    context: Context, shaders: Shaders, brdf: Brdf, values: Values, l: NDArray[Any], v: NDArray[Any]
 ) -> NDArray[np.float32]:
-    source = Source(expand("pass/evaluate.vert", generated(brdf)), None)
+    source = Source(expand("pass/evaluate.vert", generated(brdf), shaders), None)
     program = Program(context, source, varyings=("v_value",))
     for name, value in values.items():
         program.write(f"u_{name}", value)
@@ -70,16 +85,16 @@ def _in_vertex_stage(
     names = [name for name in ("a_l", "a_v") if name in program.attributes]
     content = [(gl.buffer({"a_l": l, "a_v": v}[name].tobytes()), "3f", name) for name in names]
     result = gl.buffer(reserve=l.nbytes)
-    # Without a framebuffer bound, llvmpipe writes zeros and says nothing.
+    # Without a bound framebuffer, llvmpipe captures zeros and reports no error.
     gl.simple_framebuffer((1, 1)).use()
     gl.vertex_array(program.gl, content).transform(result, moderngl.POINTS, vertices=len(l))
     return np.frombuffer(result.read(), dtype=np.float32).reshape(-1, 3)
 
 
 def _in_fragment_stage(
-    context: Context, brdf: Brdf, values: dict[str, NDArray[np.float32]], l: NDArray[Any], v: NDArray[Any]
+    context: Context, shaders: Shaders, brdf: Brdf, values: Values, l: NDArray[Any], v: NDArray[Any]
 ) -> NDArray[np.float32]:
-    source = Source(expand("pass/picture.vert", {}), expand("pass/evaluate.frag", generated(brdf)))
+    source = Source(expand("pass/picture.vert", {}, shaders), expand("pass/evaluate.frag", generated(brdf), shaders))
     program = Program(context, source)
     for name, value in values.items():
         program.write(f"u_{name}", value)

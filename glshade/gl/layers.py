@@ -1,4 +1,4 @@
-"""Layers on the GPU: the parts that a film's layers are made of, each drawn once, and what follows from them."""
+"""Layers: draws the layers that a film asks for, from a few parts of the scene that are drawn once each."""
 
 from __future__ import annotations
 
@@ -12,57 +12,74 @@ from numpy.typing import NDArray
 
 from glshade.assembly.assembly import Assembly
 from glshade.assembly.part import Part
+from glshade.gl.tiles import Offset, shifts
 from glshade.image import cryptomatte
 from glshade.image.image import Image
 from glshade.image.layers import Layers, names_attribute
 from glshade.radiance.readying import ready
-from glshade.scene.scene import Film, Rate, Scene
+from glshade.scene.film import Film
+from glshade.scene.object import Rate
+from glshade.scene.scene import Scene
 
 Array = NDArray[np.float32]
 Numbers = NDArray[np.int32]
-Made = dict[str, Array]
-# A pixel of a mask has at least this many points a side.
+# Layer name -> pixels (H, W, channels).
+Arrays = dict[str, Array]
+# A mask is sampled at a grid of points in each pixel, with at least this many points along each axis.
 POINTS = 4
 
 
 class Draws(Protocol):
-    """What the layers ask of a Renderer."""
+    """The methods of a Renderer that the layers need."""
 
     @property
     def render(self) -> Callable[..., Image]:
         """Draws the picture of a scene."""
 
     @property
-    def shown(self) -> Callable[..., Iterator[Array]]:
-        """Draws a part of a scene, (H, W, 4) float32: once, or once for each offset."""
+    def draw_part(self) -> Callable[..., Iterator[Array]]:
+        """Draws a part of a scene as pictures (H, W, 4) float32: one picture, or one for each offset."""
 
 
-def layers(renderer: Draws, scene: Scene, dtype: str, shading: Rate | None, tile: int | None) -> Layers:
-    """The picture of a scene and the layers that its film asks for. Errors: SceneError, ShaderError."""
+def draw_layers(renderer: Draws, scene: Scene, dtype: str, shading: Rate | None, tile: int | None) -> Layers:
+    """The picture of a scene and the layers that its film asks for.
+
+    renderer: the renderer that draws.
+    scene: the scene to draw.
+    dtype: uint8 or float32, the type of the picture.
+    shading: optional; replaces the shading rate of every object.
+    tile: optional; the largest side that is drawn in one piece [pixels].
+    Errors: SceneError, ShaderError.
+    """
     image = renderer.render(scene, dtype=dtype, shading=shading, tile=tile)
     if not scene.film.aovs:
         return Layers(image, {})
     maker = _Maker(renderer, scene, shading, tile)
-    arrays: Made = {}
+    arrays: Arrays = {}
     for aov in scene.film.aovs:
         arrays |= getattr(maker, aov)()
     return Layers(image, arrays, maker.attributes)
 
 
 def surfaces(renderer: Draws, scene: Scene) -> tuple[Array, Numbers]:
-    """(depth (H, W), number (H, W)) at the middle of every pixel, row 0 at the top.
+    """Returns (depth (H, W), number (H, W)) of the nearest surface at the centre of every pixel, row 0 at the top.
 
-    depth: along the view axis [scene units], 0 where nothing is. number: of the scene's objects, which one; -1 where nothing
-    is. A cut-out has holes; a blended surface counts as solid. Errors: SceneError, ShaderError.
+    depth is measured along the view axis [scene units], and is 0 where there is no surface. number is the index of the object
+    in the scene, -1 where there is no surface. Cut-outs have holes; blended surfaces count as opaque.
+    Errors: SceneError, ShaderError.
     """
     maker = _Maker(renderer, scene, None, None)
-    depth, number = maker.nearest
-    of = np.array([*(one.number for one in maker.assembly.instances), -1], dtype=np.int32)
-    return _single(depth), of[number]
+    depth, instance = maker.nearest
+    objects = np.array([*(each.number for each in maker.assembly.instances), -1], dtype=np.int32)
+    return _float32(depth), objects[instance]
 
 
 class _Maker:
-    """Makes the layers of one scene: a method each, by the layer's name."""
+    """Makes the layers of one scene. Each layer has a method of its name, which returns the arrays to save.
+
+    assembly: the assembled scene.
+    attributes: the attributes to save with the layers; the methods add to them.
+    """
 
     def __init__(self, renderer: Draws, scene: Scene, shading: Rate | None, tile: int | None) -> None:
         self._renderer, self._scene, self._shading, self._tile = renderer, scene, shading, tile
@@ -70,118 +87,124 @@ class _Maker:
         self.attributes: dict[str, str] = {}
 
     def _draw(self, part: Part) -> Array:
-        """(H, W, 4)."""
-        (pixels,) = self._renderer.shown(self._scene, part, shading=self._shading, tile=self._tile)
+        """The pixels (H, W, 4) of a part of the scene."""
+        (pixels,) = self._renderer.draw_part(self._scene, part, shading=self._shading, tile=self._tile)
         return pixels
 
     @cached_property
     def nearest(self) -> tuple[NDArray[np.float64], Numbers]:
-        """depth (H, W) [scene units], and which instance (H, W), -1 for none: at the middle of each pixel."""
+        """(depth (H, W) [scene units], index of the instance (H, W)) at the centre of each pixel; -1 where no surface is."""
         pixels = self._draw(Part("depth"))
-        return pixels[..., 0] / np.float64(self.assembly.unit), _which(pixels)
+        return pixels[..., 0] / np.float64(self.assembly.unit), _instances(pixels)
 
-    def depth(self) -> Made:
-        return {"depth": _single(self.nearest[0])[..., None]}
+    def depth(self) -> Arrays:
+        return {"depth": _float32(self.nearest[0])[..., None]}
 
-    def position(self) -> Made:
-        depth, number = self.nearest
+    def position(self) -> Arrays:
+        depth, instance = self.nearest
         place = positions(depth, self.assembly, self._scene.film)
-        return {"position": _single(np.where((number >= 0)[..., None], place, 0.0))}
+        return {"position": _float32(np.where((instance >= 0)[..., None], place, 0.0))}
 
-    def object_id(self) -> Made:
+    def object_id(self) -> Arrays:
         names = [item.name or f"objects[{index}]" for index, item in enumerate(self._scene.objects)]
-        return self._ids("object_id", [names[one.number] for one in self.assembly.instances], names)
+        return self._ids("object_id", [names[instance.number] for instance in self.assembly.instances], names)
 
-    def material_id(self) -> Made:
-        named = [one.made_of for one in self.assembly.instances]
-        return self._ids("material_id", named, list(dict.fromkeys(named)))
+    def material_id(self) -> Arrays:
+        materials = [instance.made_of for instance in self.assembly.instances]
+        return self._ids("material_id", materials, list(dict.fromkeys(materials)))
 
-    def _ids(self, layer: str, of: list[str], names: list[str]) -> Made:
-        """The places of the instances' names among all names, counted from 1; 0 for nothing."""
-        place = {name: index + 1 for index, name in enumerate(names)}
+    def _ids(self, layer: str, instance_names: list[str], names: list[str]) -> Arrays:
+        """A layer of numbers: each pixel has the position (from 1) of its instance's name in `names`, or 0 for none."""
+        ids = {name: index + 1 for index, name in enumerate(names)}
         self.attributes[f"glshade:{layer}"] = names_attribute(names)
-        return {layer: np.array([*(place[name] for name in of), 0], dtype=np.float32)[self.nearest[1]][..., None]}
+        values = np.array([*(ids[name] for name in instance_names), 0], dtype=np.float32)
+        return {layer: values[self.nearest[1]][..., None]}
 
     @cached_property
     def _normals(self) -> NDArray[np.float64]:
-        """(H, W, 3): unit, in world space."""
+        """The unit normals (H, W, 3) in world space; 0 where there is no surface."""
         normal = self._draw(Part("normal"))[..., :3].astype(np.float64)
         length = np.linalg.norm(normal, axis=2, keepdims=True)
         normal /= np.where(length > 0, length, 1.0)
         return normal
 
-    def normal(self) -> Made:
+    def normal(self) -> Arrays:
         return {"normal": self._normals.astype(np.float32)}
 
-    def view_normal(self) -> Made:
+    def view_normal(self) -> Arrays:
         return {"view_normal": (self._normals @ self.assembly.view.axes.T).astype(np.float32)}
 
-    def uv(self) -> Made:
+    def uv(self) -> Arrays:
         return {"uv": self._draw(Part("uv"))[..., :2]}
 
-    def albedo(self) -> Made:
+    def albedo(self) -> Arrays:
         return {"albedo": self._draw(Part("albedo"))[..., :3]}
 
-    def background(self) -> Made:
+    def background(self) -> Arrays:
         return {"background": self._draw(Part("unlit"))[..., :3]}
 
     @cached_property
     def _specular(self) -> Array:
         return self._draw(Part("specular"))[..., :3]
 
-    def specular(self) -> Made:
+    def specular(self) -> Arrays:
         return {"specular": self._specular}
 
-    def diffuse(self) -> Made:
-        # What the highlights leave, so that the two add up.
+    def diffuse(self) -> Arrays:
+        # The difference makes the two layers add up exactly to the light that is drawn.
         return {"diffuse": self._draw(Part("lit"))[..., :3] - self._specular}
 
-    def lights(self) -> Made:
+    def lights(self) -> Arrays:
         return {name: self._draw(Part("light", index))[..., :3] for index, name in enumerate(light_layers(self.assembly))}
 
-    def cryptomatte(self) -> Made:
+    def cryptomatte(self) -> Arrays:
         points = [
-            _which(pixels)
-            for pixels in self._renderer.shown(
-                self._scene, Part("depth"), shading=self._shading, tile=self._tile, offsets=offsets(self._scene.film)
+            _instances(pixels)
+            for pixels in self._renderer.draw_part(
+                self._scene, Part("depth"), shading=self._shading, tile=self._tile, offsets=mask_points(self._scene.film)
             )
         ]
-        made: Made = {}
+        instances = self.assembly.instances
+        arrays: Arrays = {}
         for layer in (cryptomatte.OBJECT, cryptomatte.MATERIAL):
-            of = [one.name if layer == cryptomatte.OBJECT else one.made_of for one in self.assembly.instances]
-            names = list(dict.fromkeys(of))
-            place = {name: index for index, name in enumerate(names)}
-            places = np.array([*(place[name] for name in of), -1], dtype=np.int32)
-            pairs = cryptomatte.ranked([places[point] for point in points], names)
+            instance_names = [each.name if layer == cryptomatte.OBJECT else each.made_of for each in instances]
+            names = list(dict.fromkeys(instance_names))
+            index_of = {name: index for index, name in enumerate(names)}
+            indices = np.array([*(index_of[name] for name in instance_names), -1], dtype=np.int32)
+            pairs = cryptomatte.ranked([indices[point] for point in points], names)
             self.attributes |= cryptomatte.metadata(layer, names)
-            made |= {f"{layer}{i:02}": pairs[..., 4 * i : 4 * i + 4] for i in range(cryptomatte.LAYERS)}
-        return made
+            arrays |= {f"{layer}{i:02}": pairs[..., 4 * i : 4 * i + 4] for i in range(cryptomatte.LAYERS)}
+        return arrays
 
 
-def _which(pixels: Array) -> Numbers:
-    """(H, W): the instance in each pixel of a picture of depths, -1 for none."""
+def _instances(pixels: Array) -> Numbers:
+    """The index (H, W) of the instance in each pixel of a picture of depths; -1 where there is no surface."""
     return np.where(pixels[..., 3] > 0, pixels[..., 1], -1).astype(np.int32)
 
 
-def _single(value: NDArray[np.float64]) -> Array:
-    """float32; what is too large for it is infinite, as in any file."""
+def _float32(value: NDArray[np.float64]) -> Array:
+    """The values in float32. Those beyond its range become infinite, as they would in a file."""
     with np.errstate(over="ignore"):
         return value.astype(np.float32)
 
 
-def offsets(film: Film) -> list[tuple[float, float]]:
-    """The points of a pixel at which masks are sampled, from its middle [pixels]: the film's shifted pictures, or more."""
-    n = max(POINTS, film.supersample)
-    shifts = [(i + 0.5) / n - 0.5 for i in range(n)]
-    return [(x, y) for y in shifts for x in shifts]
+def mask_points(film: Film) -> list[Offset]:
+    """The points of a pixel at which masks are sampled, as offsets from its centre: an even grid, at least as fine as the
+    picture's supersampling."""
+    return shifts(max(POINTS, film.supersample))
 
 
 def positions(depth: NDArray[np.float64], assembly: Assembly, film: Film) -> NDArray[np.float64]:
-    """(H, W, 3): the places in the world [scene units] of what is `depth` (H, W) away at the middle of each pixel."""
+    """The positions (H, W, 3) in the world [scene units] of the points that are seen at the centres of the pixels.
+
+    depth: the depths (H, W) of these points along the view axis [scene units].
+    assembly: the assembled scene.
+    film: the scene's film.
+    """
     view, (x, y, w, h), (width, height) = assembly.view, film.window, film.size
     across = (2 * (x + np.arange(w) + 0.5) / width - 1)[None, :] * view.half_width
     up = (1 - 2 * (y + np.arange(h) + 0.5) / height)[:, None] * view.half_height
-    # Of a parallel view these are lengths, in the assembly's unit.
+    # In a parallel view, half_width and half_height are lengths in the assembly's unit, and depth does not spread the rays.
     spread = depth if view.perspective else np.float64(1 / assembly.unit)
     right, above, backward = view.axes
     place = (across * spread)[..., None] * right + (up * spread)[..., None] * above - depth[..., None] * backward
@@ -190,7 +213,10 @@ def positions(depth: NDArray[np.float64], assembly: Assembly, film: Film) -> NDA
 
 
 def light_layers(assembly: Assembly) -> list[str]:
-    """A layer's name for each light: its own, or its place. Dots and the like would cut the name in two elsewhere."""
+    """The name of each light's layer: `light_` with the light's name or index.
+
+    Characters that are not letters, digits or _ are replaced, because EXR files separate layers and channels by dots.
+    """
     names: list[str] = []
     for index, light in enumerate(assembly.lights):
         name = f"light_{re.sub(r'[^0-9A-Za-z_]', '_', light.name or str(index))}"

@@ -1,8 +1,9 @@
-"""Linker: makes moderngl's programs from binaries on disk where there are some (glGetProgramBinary, glProgramBinary).
+"""Linker: makes moderngl programs from binaries in the disk cache (glGetProgramBinary, glProgramBinary).
 
-moderngl compiles, links and reflects a program in one call, and knows no binaries. But it asks its context for every GL
-function, so the Linker stands in as the context and hands out its own for three of them: while it has a binary at hand,
-nothing is compiled, and to link is to load. docs/decisions/0008-program-binaries.md tells what that is worth.
+moderngl compiles, links and inspects a program in one call, and has no interface for binaries. But it asks its context for the
+address of every GL function. The Linker takes the place of the context and returns functions of its own for three of them:
+while it loads a binary, compiling does nothing, and linking loads the binary. docs/decisions/0008-program-binaries.md has the
+measured gain.
 """
 
 from __future__ import annotations
@@ -40,17 +41,23 @@ _SIGNATURES: dict[str, Any] = {
 
 
 class Linker:
-    """A context for moderngl around another one, which has to be current when the Linker is made.
+    """A context object for moderngl that wraps the one of glcontext or OSMesa.
 
-    offers_binaries: whether the driver does; where not, the Linker is of no use.
+    offers_binaries: whether the driver supports program binaries; if not, the Linker must not be used.
     """
 
     def __init__(self, window: Any, binaries: Binaries, backend: str) -> None:
-        """window: what moderngl would have as its `context=`, glcontext's or OSMesa's."""
+        """Asks the driver for its binary formats.
+
+        window: the context object that moderngl would otherwise get as `context=`. It must be current.
+        binaries: the disk cache.
+        backend: the name of the backend, which is part of the cache's keys.
+        """
         self._window, self._binaries = window, binaries
-        # While a program is made: what is loaded in place of compiling, whether the driver took it, and what went wrong.
-        self._at_hand: Binary | None = None
-        self._taken = False
+        # The state of one call of _make(): the binary to load in place of compiling, whether the driver accepted it, and the
+        # exception that a callback raised.
+        self._binary_to_load: Binary | None = None
+        self._accepted = False
         self._raised: BaseException | None = None
         self._gl: dict[str, Any] = {}
         for name, signature in _SIGNATURES.items():
@@ -62,17 +69,18 @@ class Linker:
         self._own: dict[str, Any] = {}
         if formats:
             names = [self._gl["glGetString"](name) or b"" for name in (GL_VENDOR, GL_RENDERER, GL_VERSION)]
-            # The backend too: one driver behind two doors is two libraries, which need not take each other's binaries.
+            # The backend is part of the key: EGL and OSMesa load different libraries of the same driver, and neither needs to
+            # accept the other's binaries.
             self._driver = repr((__version__, backend, names, formats))
             for name, own in (
                 ("glCompileShader", self._compile),
                 ("glGetShaderiv", self._ask_shader),
                 ("glLinkProgram", self._link),
             ):
-                self._own[name] = _SIGNATURES[name](self._kept_from_ctypes(own))
+                self._own[name] = _SIGNATURES[name](self._storing_exceptions(own))
 
     def load_opengl_function(self, name: str) -> int:
-        """The address of a GL function, 0 where there is none."""
+        """The address of a GL function, 0 if the driver does not have it."""
         own = self._own.get(name)
         return self._window.load_opengl_function(name) if own is None else ctypes.cast(own, _pointer).value or 0
 
@@ -87,36 +95,45 @@ class Linker:
         self._window.release()
 
     def program(self, gl: moderngl.Context, vertex: str, fragment: str | None) -> moderngl.Program:
-        """The program of these texts, linked. gl: made with this Linker. Errors: moderngl.Error, the driver's words."""
+        """The linked program of two texts, from the disk cache if it is there; else it is compiled and added to the cache.
+
+        gl: the moderngl context that was made with this Linker.
+        vertex: the text of the vertex stage.
+        fragment: the text of the fragment stage, None if there is none.
+        Errors: moderngl.Error with the driver's message.
+        """
         key = self.key(vertex, fragment)
         stored = self._binaries.recall(key)
         if stored:
             try:
                 program = self._make(gl, vertex, fragment, stored)
             except moderngl.Error:
-                # The driver took neither its binary nor, uncompiled until then, the texts; what is wrong with them it says now.
+                # The driver rejected the binary, and the texts do not link either. Compiling them anew, below, gives the
+                # messages that the compiler gives without a cache.
                 stored = None
         if not stored:
             program = self._make(gl, vertex, fragment, None)
-        if not self._taken and (binary := self._binary(program.glo)):
+        if not self._accepted and (binary := self._binary(program.glo)):
             self._binaries.keep(key, binary)
         return program
 
     def key(self, vertex: str, fragment: str | None) -> str:
-        """What an entry is found by: a digest of the texts, the driver, its formats, and glshade's version."""
+        """The cache key of a program: a digest of its texts, the driver, the driver's formats and glshade's version."""
         return hashlib.sha256("\0".join((self._driver, vertex, fragment or "")).encode()).hexdigest()
 
-    def _make(self, gl: moderngl.Context, vertex: str, fragment: str | None, at_hand: Binary | None) -> moderngl.Program:
-        self._at_hand, self._taken, self._raised = at_hand, False, None
+    def _make(self, gl: moderngl.Context, vertex: str, fragment: str | None, binary: Binary | None) -> moderngl.Program:
+        """The program, loaded from a binary if one is given and the driver accepts it, else compiled from its texts."""
+        self._binary_to_load, self._accepted, self._raised = binary, False, None
         try:
             return gl.program(vertex, fragment)
         finally:
-            self._at_hand = None
+            self._binary_to_load = None
             if self._raised:
                 raise self._raised
 
-    def _kept_from_ctypes(self, function: Callable[..., None]) -> Callable[..., None]:
-        """The function, its exceptions put aside: ctypes prints them and goes on, and a Ctrl-C would be lost."""
+    def _storing_exceptions(self, function: Callable[..., None]) -> Callable[..., None]:
+        """A callback that stores the exceptions of a function, for _make() to raise: ctypes would only print them, so that a
+        KeyboardInterrupt would be lost."""
 
         def called(*arguments: Any) -> None:
             try:
@@ -127,23 +144,27 @@ class Linker:
         return called
 
     def _compile(self, shader: int) -> None:
-        if not self._at_hand:
+        """Stands in for glCompileShader: does nothing while a binary is loaded."""
+        if not self._binary_to_load:
             self._gl["glCompileShader"](shader)
 
     def _ask_shader(self, shader: int, name: int, value: Any) -> None:
-        if self._at_hand and name == GL_COMPILE_STATUS:
+        """Stands in for glGetShaderiv: moderngl must see a success for the shaders that were not compiled."""
+        if self._binary_to_load and name == GL_COMPILE_STATUS:
             value[0] = 1
         else:
             self._gl["glGetShaderiv"](shader, name, value)
 
     def _link(self, program: int) -> None:
-        if self._at_hand:
-            kind, data = self._at_hand
+        """Stands in for glLinkProgram: loads the binary if the driver accepts it, and otherwise links the shaders."""
+        if self._binary_to_load:
+            kind, data = self._binary_to_load
             self._gl["glProgramBinary"](program, kind, data, len(data))
-            self._taken = bool(self._ask_program(program, GL_LINK_STATUS))
-            if self._taken:
+            self._accepted = bool(self._ask_program(program, GL_LINK_STATUS))
+            if self._accepted:
                 return
-            # Refused, which may be an error too: nobody else is to find it.
+            # The rejection may have set the GL error. glGetError clears it, so that no later call sees it. After that, the
+            # program is compiled.
             self._gl["glGetError"]()
             shaders, count = (_uint * 8)(), _int()
             self._gl["glGetAttachedShaders"](program, len(shaders), ctypes.byref(count), shaders)
@@ -153,12 +174,14 @@ class Linker:
         self._gl["glLinkProgram"](program)
 
     def _binary(self, program: int) -> Binary | None:
+        """The binary of a linked program; None if the driver gives none."""
         data = ctypes.create_string_buffer(self._ask_program(program, GL_PROGRAM_BINARY_LENGTH))
         kind, length = _uint(), _int()
         self._gl["glGetProgramBinary"](program, len(data), ctypes.byref(length), ctypes.byref(kind), data)
         return (kind.value, data.raw[: length.value]) if length.value > 0 else None
 
     def _formats(self) -> list[int]:
+        """The numbers of the driver's binary formats, in ascending order."""
         count = _int()
         self._gl["glGetIntegerv"](GL_NUM_PROGRAM_BINARY_FORMATS, ctypes.byref(count))
         formats = (_int * max(count.value, 0))()
@@ -167,6 +190,7 @@ class Linker:
         return sorted(formats)
 
     def _ask_program(self, program: int, name: int) -> int:
+        """An integer property of a program (glGetProgramiv)."""
         value = _int()
         self._gl["glGetProgramiv"](program, name, ctypes.byref(value))
         return value.value

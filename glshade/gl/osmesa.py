@@ -1,6 +1,6 @@
-"""OSMesa: Mesa's off-screen library, for machines without EGL. Legacy: Mesa 25.1 removed it.
+"""OSMesa: contexts of Mesa's off-screen library, for machines without EGL. Mesa 25.1 removed the library.
 
-moderngl takes it as a `context=` object, with the four methods that its own contexts have.
+The class OSMesa has the four methods that moderngl needs of an object for its argument `context=`.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 from glshade.errors import ContextError
 
 LIBRARIES = ("libOSMesa.so.8", "libOSMesa.so.6")
-# GL/osmesa.h
+# The values are those of GL/osmesa.h.
 OSMESA_FORMAT, OSMESA_RGBA, OSMESA_DEPTH_BITS = 0x22, 0x1908, 0x30
 OSMESA_PROFILE, OSMESA_CORE_PROFILE = 0x33, 0x34
 OSMESA_CONTEXT_MAJOR_VERSION, OSMESA_CONTEXT_MINOR_VERSION = 0x36, 0x37
@@ -19,7 +19,7 @@ GL_UNSIGNED_BYTE = 0x1401
 
 
 def load() -> ctypes.CDLL:
-    """The library. Errors: ContextError where it is missing."""
+    """The OSMesa library. Errors: ContextError if it is missing."""
     for name in LIBRARIES:
         try:
             return ctypes.CDLL(name)
@@ -29,9 +29,14 @@ def load() -> ctypes.CDLL:
 
 
 class OSMesa:
-    """One context. It wants a colour buffer to be current, which nobody draws into: frames are textures."""
+    """One OSMesa context. OSMesa needs a colour buffer, so it gets one of a single pixel; glshade draws into textures."""
 
     def __init__(self, version: int) -> None:
+        """Makes a context, which is current afterwards.
+
+        version: the least version of OpenGL in moderngl's notation, for example 330.
+        Errors: ContextError.
+        """
         self._library = load()
         void, integer = ctypes.c_void_p, ctypes.c_int
         self._library.OSMesaCreateContextAttribs.restype = void
@@ -57,14 +62,14 @@ class OSMesa:
         return bool(self._library.OSMesaMakeCurrent(self._context, self._buffer, GL_UNSIGNED_BYTE, 1, 1))
 
     def load_opengl_function(self, name: str) -> int:
-        """The address of a GL function, 0 where there is none."""
+        """The address of a GL function, 0 if the driver does not have it."""
         return self._library.OSMesaGetProcAddress(name.encode()) or 0
 
     def __enter__(self) -> None:
         self._make_current()
 
     def __exit__(self, *unused: Any) -> None:
-        # Whoever draws next enters first.
+        # The context may stay current, because every context is entered before it is used.
         pass
 
     def release(self) -> None:

@@ -1,4 +1,4 @@
-"""Program: a Source compiled by the driver. Its messages are rewritten to the file, line and column they speak of."""
+"""Program: a Source compiled and linked by the driver, whose messages are rewritten to name file, line and column."""
 
 from __future__ import annotations
 
@@ -11,27 +11,56 @@ from numpy.typing import NDArray
 
 from glshade.errors import ShaderError
 from glshade.gl.context import Context
-from glshade.glsl.generator import Source, Stage
+from glshade.glsl.source import Source, Stage
 
-# Mesa `0:12(5): error: text`, NVIDIA `0(12) : error C1008: text`, Apple, ANGLE and Intel `ERROR: 0:12: text`.
+# Message formats: Mesa `0:12(5): error: text`, NVIDIA `0(12) : error C1008: text`, and `ERROR: 0:12: text` of Apple, ANGLE and
+# Intel.
 _MESA = re.compile(r"^\s*\d+:(?P<line>\d+)\((?P<column>\d+)\):\s*(?P<message>.*)$")
 _NVIDIA = re.compile(r"^\s*\d+\((?P<line>\d+)\)\s*:\s*(?P<message>.*)$")
 _OTHERS = re.compile(r"^\s*(?P<kind>ERROR|WARNING):\s*\d+:(?P<line>\d+):\s*(?P<message>.*)$")
 _HEADING = re.compile(r"^(vertex|fragment|geometry|compute)[ _]shader|^=+$|^GLSL Compiler failed|^GLSL Linker failed", re.I)
 
-# Khronos' registry values (gl.xml) of the types that uniforms and attributes may have.
+# The types of uniforms and attributes by their values in Khronos' registry (gl.xml).
 TYPES = {
-    **{0x1404: "int", 0x1405: "uint", 0x1406: "float", 0x8B56: "bool"},
-    **{0x8B50: "vec2", 0x8B51: "vec3", 0x8B52: "vec4", 0x8B53: "ivec2", 0x8B54: "ivec3", 0x8B55: "ivec4"},
-    **{0x8DC6: "uvec2", 0x8DC7: "uvec3", 0x8DC8: "uvec4", 0x8B57: "bvec2", 0x8B58: "bvec3", 0x8B59: "bvec4"},
-    **{0x8B5A: "mat2", 0x8B5B: "mat3", 0x8B5C: "mat4", 0x8B65: "mat2x3", 0x8B66: "mat2x4", 0x8B67: "mat3x2"},
-    **{0x8B68: "mat3x4", 0x8B69: "mat4x2", 0x8B6A: "mat4x3", 0x8B5E: "sampler2D", 0x8B5F: "sampler3D"},
-    **{0x8B60: "samplerCube", 0x8B62: "sampler2DShadow", 0x8DC1: "sampler2DArray"},
+    0x1404: "int",
+    0x1405: "uint",
+    0x1406: "float",
+    0x8B56: "bool",
+    0x8B50: "vec2",
+    0x8B51: "vec3",
+    0x8B52: "vec4",
+    0x8B53: "ivec2",
+    0x8B54: "ivec3",
+    0x8B55: "ivec4",
+    0x8DC6: "uvec2",
+    0x8DC7: "uvec3",
+    0x8DC8: "uvec4",
+    0x8B57: "bvec2",
+    0x8B58: "bvec3",
+    0x8B59: "bvec4",
+    0x8B5A: "mat2",
+    0x8B5B: "mat3",
+    0x8B5C: "mat4",
+    0x8B65: "mat2x3",
+    0x8B66: "mat2x4",
+    0x8B67: "mat3x2",
+    0x8B68: "mat3x4",
+    0x8B69: "mat4x2",
+    0x8B6A: "mat4x3",
+    0x8B5E: "sampler2D",
+    0x8B5F: "sampler3D",
+    0x8B60: "samplerCube",
+    0x8B62: "sampler2DShadow",
+    0x8DC1: "sampler2DArray",
 }
 
 
 def rewrite(log: str, stage: Stage) -> list[str]:
-    """The driver's messages, each as `file:line:column: message` (no column where the driver gives none)."""
+    """The messages in a driver's log, each as `file:line:column: message`, without a column if the driver gives none.
+
+    log: the log of the compiler or linker.
+    stage: the stage that the line numbers in the log refer to.
+    """
     result = []
     for raw in log.splitlines():
         for pattern in (_MESA, _NVIDIA, _OTHERS):
@@ -48,9 +77,23 @@ def rewrite(log: str, stage: Stage) -> list[str]:
 
 
 class Program:
-    """A linked program. uniforms, attributes: the names of the active ones; blocks: of the uniform blocks."""
+    """A linked program.
+
+    gl: moderngl's program.
+    members: name -> moderngl's object, of all active variables.
+    attributes: the names of the active vertex attributes.
+    uniforms: the names of the active uniforms.
+    blocks: the names of the active uniform blocks.
+    """
 
     def __init__(self, context: Context, source: Source, varyings: tuple[str, ...] = ()) -> None:
+        """Compiles and links a program, or loads it from the disk cache.
+
+        context: the context, which must be current.
+        source: the text of the program.
+        varyings: the outputs of the vertex stage that transform feedback captures.
+        Errors: ShaderError with the driver's messages.
+        """
         try:
             fragment = source.fragment.text if source.fragment else None
             if context.linker and not varyings:
@@ -66,8 +109,11 @@ class Program:
 
     @property
     def interface(self) -> dict[str, dict[str, Any]]:
-        """What is active, ready for JSON: "attributes" and "uniforms" by name with their GLSL types, as in `vec3` or
-        `float[4]` (an array of one is told as no array), and "blocks" by name with their sizes [bytes]."""
+        """The active variables as JSON types.
+
+        "attributes" and "uniforms": name -> GLSL type, for example `vec3` or `float[4]`; an array of one counts as no array.
+        "blocks": name -> size [bytes].
+        """
         return {
             "attributes": {name: _type(self.members[name]) for name in self.attributes},
             "uniforms": {name: _type(self.members[name]) for name in self.uniforms},
@@ -75,29 +121,30 @@ class Program:
         }
 
     def write(self, name: str, value: NDArray[np.float32]) -> None:
-        """Sets a float uniform or an array of them; a matrix (`u_to_from_from`) is turned to columns, as GL has them.
+        """Sets a float uniform or an array of them. A name that is not an active uniform is ignored.
 
-        A uniform that the driver found unused is passed over.
+        name: the uniform. One whose name contains `_from_` is a matrix, which GL stores by columns, so it is transposed.
+        value: its value, matrices by rows.
         """
         member = self.members.get(name)
         if member is not None:
             member.write((value.T if "_from_" in name else value).tobytes())
 
     def set_integer(self, name: str, value: int) -> None:
-        """Sets an int or a sampler's unit."""
+        """Sets an int uniform, or the texture unit of a sampler. A name that is not an active uniform is ignored."""
         member = self.members.get(name)
         if member is not None:
             member.value = value
 
 
 def _type(member: Any) -> str:
-    """The GLSL type of a uniform or an attribute; a number where the table has none."""
+    """The GLSL type of a uniform or an attribute; its number in hexadecimal digits if TYPES does not have it."""
     name = TYPES.get(member.gl_type, f"{member.gl_type:#06x}")
     return f"{name}[{member.array_length}]" if member.array_length > 1 else name
 
 
 def _explain(message: str, source: Source) -> list[str]:
-    """moderngl names the stage in its heading: `vertex_shader` or `fragment_shader`."""
+    """The lines of a moderngl error, rewritten. Its heading, `vertex_shader` or `fragment_shader`, tells the stage."""
     in_fragment = source.fragment and re.search(r"fragment[_ ]shader", message)
     lines = rewrite(message, source.fragment if source.fragment and in_fragment else source.vertex)
     return lines or [message]

@@ -1,12 +1,8 @@
-"""Renderer: draws scenes on one OpenGL context, and keeps what it compiled and uploaded for the next one."""
+"""Renderer: draws scenes on one OpenGL context, and caches programs, meshes and textures for the next scene."""
 
 from __future__ import annotations
 
-import sys
-import warnings
-from collections import OrderedDict
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
 from time import perf_counter
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -16,24 +12,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.arrays import rounded
-from glshade.assembly.assembly import Assembly, Instance
-from glshade.assembly.culling import facing
-from glshade.errors import SceneError
 from glshade.gl.context import Backend, Context, open_context
-from glshade.gl.frame import FORMATS, Box, Frame, Storage
-from glshade.gl.program import Program
-from glshade.gl.textures import upload
-from glshade.gl.vertices import Vertices
-from glshade.glsl.flat_inputs import with_flat_inputs
-from glshade.glsl.generator import PAGE, Source, expand, generate
-from glshade.glsl.plan import ProgramPlan, plan_instance
-from glshade.glsl.uniforms import Values, ambient_radiance, light_pages, light_uniforms, object_uniforms, textures
+from glshade.gl.frame import Box, Frame
+from glshade.gl.preparation import DrawCall, Encoding, Prepared, Preparer
+from glshade.gl.resources import Resources
+from glshade.gl.tiles import TILE, Offset, passes, pieces
+from glshade.glsl.generator import encoder
+from glshade.glsl.shaders import Shaders, current
+from glshade.glsl.source import Rewrite
 from glshade.image.image import Image
+from glshade.image.srgb import linear_to_srgb
+from glshade.lru import Lru
 from glshade.radiance.readying import ready
 from glshade.scene.camera import window
-from glshade.scene.digest import digest
-from glshade.scene.scene import Film, Rate, Scene
-from glshade.textures.texels import Texels
+from glshade.scene.digest import scene_digest
+from glshade.scene.models import Folders, paths, use_models
+from glshade.scene.object import Rate
+from glshade.scene.scene import Scene
 from glshade.version import __version__
 
 if TYPE_CHECKING:
@@ -41,59 +36,43 @@ if TYPE_CHECKING:
     from glshade.image.layers import Layers
 
 DType = Literal["uint8", "float32"]
-# Larger pictures are drawn in tiles: at 8192 x 8192 colour and depth already take 1.25 GiB in float32.
-TILE = 8192
-# Scenes whose programs and buffers stay at hand; an animation alternates between few.
-KEPT_SCENES = 8
-KEPT_TEXTURES = 256
-# Pixels of the picture a triangle from which on flat inputs save time: measured, with one light and with eight, on llvmpipe.
-FLAT_PIXELS = 8
-
-
-class ApproximateWarning(UserWarning):
-    """The picture has a part that is right in kind, but not pixel by pixel."""
-
-
-@dataclass(eq=False)
-class Draw:
-    """One draw call, with what it needs set before it."""
-
-    instance: Instance
-    plan: ProgramPlan
-    program: Program
-    vertices: moderngl.VertexArray
-    values: Values
-    samplers: list[tuple[str, moderngl.Texture]]
-    lights: Values
-    pages: list[tuple[str, moderngl.Buffer, int]]
-    # A further page of lights, added to what the first has drawn.
-    added: bool = False
-
-
-@dataclass(eq=False)
-class Prepared:
-    """A scene made ready to draw in one storage."""
-
-    scene: Scene
-    assembly: Assembly
-    draws: list[Draw]
-    attributes: dict[str, str] | None = None
+# The limits of the cache of prepared scenes: their number, and their size [bytes]. An animation alternates between few scenes.
+SCENES, SCENES_SIZE = 8, 96 << 20
 
 
 class Renderer:
-    """Draws scenes. A context manager: `with glshade.Renderer() as renderer: image = renderer.render(scene)`.
+    """Draws scenes. It is a context manager: `with glshade.Renderer() as renderer: image = renderer.render(scene)`.
 
-    backend: auto, egl, osmesa or standalone; device: an index of `glshade devices`. Errors: ContextError.
+    context: the OpenGL context.
+    resources: the cached programs, meshes, textures and frames.
+    rewrite: optional; a function that is applied to every program's Source before it is compiled.
     """
 
-    def __init__(self, backend: Backend = "auto", device: int | None = None) -> None:
+    def __init__(
+        self,
+        backend: Backend = "auto",
+        device: int | None = None,
+        *,
+        shaders: Folders | None = None,
+        models: Folders | None = None,
+    ) -> None:
+        """Opens an OpenGL context. An edited shader or model file takes effect from the next picture on.
+
+        backend: auto, egl, osmesa or standalone.
+        device: optional; an index of `glshade devices`.
+        shaders: optional; one folder or several, whose GLSL files replace the shipped ones of the same name.
+        models: optional; one folder or several with the user's own reflectance models and lights. Their Python files are
+            executed (glshade.scene.models).
+        Errors: ContextError, ShaderError, SceneError.
+        """
+        use_models(models)
+        self.rewrite: Rewrite | None = None
+        self._folders = paths(shaders)
+        current(self._folders)
         self.context: Context = open_context(backend, device)
-        self._vertices = Vertices(self.context)
-        self._programs: dict[tuple[Source, bool], Program] = {}
-        self._frames: dict[tuple[Any, ...], Frame] = {}
-        self._textures: OrderedDict[Any, moderngl.Texture] = OrderedDict()
-        self._prepared: OrderedDict[tuple[Any, ...], Prepared] = OrderedDict()
-        self._buffers: list[NDArray[Any]] = []
+        self.resources = Resources(self.context)
+        self._preparer = Preparer(self.resources)
+        self._prepared: Lru[tuple[Any, ...], Prepared] = Lru(SCENES_SIZE, most=SCENES)
 
     def __enter__(self) -> Renderer:
         return self
@@ -102,15 +81,18 @@ class Renderer:
         self.release()
 
     def release(self) -> None:
-        """Gives the context and all it holds back to the driver."""
+        """Destroys the context and all of its objects. A second call does nothing."""
         self.context.release()
 
     def render(self, scene: Scene, *, dtype: DType = "uint8", shading: Rate | None = None, tile: int | None = None) -> Image:
         """The picture of a scene.
 
-        dtype: "uint8" for the picture as the film encodes it, "float32" for linear light, signed and unclipped. shading:
-        overrules every object's. tile: the largest side drawn in one piece [pixels]; left out: what the driver can.
-        Errors: SceneError, ShaderError.
+        scene: the scene to draw.
+        dtype: "uint8" for the picture in the film's encoding, "float32" for linear light, signed and unclipped.
+        shading: optional; replaces the shading rate of every object.
+        tile: optional; the largest side that is drawn in one piece [pixels]. Default: the largest that glshade and the driver
+            both allow.
+        Errors: ValueError, SceneError, ShaderError.
         """
         for given, allowed in ((dtype, get_args(DType)), (shading, (None, *get_args(Rate)))):
             if given not in allowed:
@@ -122,51 +104,58 @@ class Renderer:
 
     def layers(self, scene: Scene, *, dtype: DType = "float32", shading: Rate | None = None, tile: int | None = None) -> Layers:
         """The picture of a scene with the layers that its film asks for (`aovs`). Arguments and errors as for `render`."""
-        from glshade.gl.layers import layers
+        from glshade.gl.layers import draw_layers
 
-        return layers(self, scene, dtype, shading, tile)
+        return draw_layers(self, scene, dtype, shading, tile)
 
     def surfaces(self, scene: Scene) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
-        """What is seen at the middle of every pixel: (depth (H, W), number (H, W)), as in `glshade.gl.layers`."""
+        """Returns (depth (H, W), object number (H, W)) at the centres of the pixels; see `glshade.gl.layers.surfaces`."""
         from glshade.gl.layers import surfaces
 
         return surfaces(self, scene)
 
-    def shown(
+    def draw_part(
         self,
         scene: Scene,
         part: Part,
         *,
         shading: Rate | None = None,
         tile: int | None = None,
-        offsets: Iterable[tuple[float, float]] | None = None,
+        offsets: Iterable[Offset] | None = None,
     ) -> Iterator[NDArray[np.float32]]:
-        """(H, W, 4) float32: a part of the scene, linear and premultiplied.
+        """Yields pictures (H, W, 4) of a part of the scene, in float32, linear and premultiplied.
 
-        offsets [pixels]: of a picture each, in place of the one whose samples are the film's. Errors: SceneError, ShaderError.
+        scene: the scene to draw.
+        part: the part of its light, or the property of its surfaces, that is drawn.
+        shading: optional; replaces the shading rate of every object.
+        tile: optional; the largest side that is drawn in one piece [pixels].
+        offsets: optional; (right, down) [pixels]. Each gives a picture with one sample per pixel, shifted from the pixel's
+            centre. Default: one picture with the film's samples.
+        Errors: SceneError, ShaderError.
         """
         scene = part.scene(scene)
         _, _, width, height = scene.film.window
-        own = _passes(scene.film, self.context.gl.max_samples)
-        for passes in [own] if offsets is None else [[offset] for offset in offsets]:
+        own = passes(scene.film, self.context.gl.max_samples)
+        for sample_offsets in [own] if offsets is None else [[offset] for offset in offsets]:
             pixels = np.empty((height, width, 4), dtype=np.float32)
             with self.context.gl:
                 self.context.gl.gc()
-                self._fill(self._prepare(scene, shading, "linear", part), passes, False, tile, pixels)
+                self._fill(self.prepare(scene, shading, "linear", part), sample_offsets, False, tile, pixels)
             yield pixels
 
     def drawing(self, scene: Scene) -> Callable[[], float]:
-        """A function that draws the scene's linear picture once more and says how long that took [s].
+        """A function that draws the scene's linear picture and returns the time that the drawing took [s].
 
-        By the clock on the wall, until the driver has finished: from the first clear to the last pixel, without assembling,
-        uploading and reading back. The first call draws once beforehand, because a first draw compiles. Pictures larger than
-        a tile are not for this. Errors: SceneError, ShaderError.
+        It measures wall-clock time from the first clear until the driver has finished, without assembling, uploading and
+        reading back. Its first call draws twice and times the second drawing, because drivers compile at the first one.
+        The whole picture is drawn in one piece, so it must not be larger than the driver's largest frame.
+        Errors: SceneError, ShaderError.
         """
         with self.context.gl:
-            prepared = self._prepare(scene, None, "linear")
+            prepared = self.prepare(scene, None, "linear")
         film = scene.film
         samples = min(film.samples, self.context.gl.max_samples)
-        passes = _passes(film, self.context.gl.max_samples)
+        sample_offsets = passes(film, self.context.gl.max_samples)
         background = _background(film.background, "linear")
         whole = prepared.assembly.view.clip_from_world(self.context.zero_to_one)
         warm = False
@@ -174,14 +163,14 @@ class Renderer:
         def draw() -> float:
             nonlocal warm
             with self.context.gl as gl:
-                # Frames are kept by the renderer, which may have let go of this one since.
-                frame = self._frame(film.size, _linear(prepared), samples)
+                # The frame is looked up at every call, since the cache may have evicted it.
+                frame = self.resources.frame(film.size, prepared.linear_storage, samples)
                 for _ in range(1 if warm else 2):
                     gl.finish()
                     start = perf_counter()
-                    for dx, dy in passes:
+                    for dx, dy in sample_offsets:
                         frame.begin(background, film.crop)
-                        self._draw_all(prepared, rounded(window(whole, film.size, dx, dy, *film.size)))
+                        self.draw(prepared, rounded(window(whole, film.size, dx, dy, *film.size)))
                     gl.finish()
                     seconds = perf_counter() - start
                 warm = True
@@ -189,24 +178,83 @@ class Renderer:
 
         return draw
 
+    def prepare(self, scene: Scene, shading: Rate | None, encoding: Encoding, part: Part | None = None) -> Prepared:
+        """The scene ready to draw, from the cache if neither the scene nor a shader file has changed.
+
+        The context must be current.
+        scene: the scene to draw.
+        shading: optional; replaces the shading rate of every object.
+        encoding: the encoding that the programs write.
+        part: optional; the part of the scene's light, or the property of its surfaces, that is drawn.
+        Errors: SceneError, ShaderError.
+        """
+        key = (id(scene), shading, encoding, part, self.rewrite)
+        prepared = self._prepared.get(key)
+        if prepared is None or prepared.scene is not scene or not prepared.is_current():
+            assembly = ready(scene, shading, part)
+            prepared = self._preparer.prepare(scene, assembly, encoding, current(self._folders), self.rewrite)
+            self._prepared.put(key, prepared, prepared.size)
+        return prepared
+
+    def draw(self, prepared: Prepared, clip: NDArray[np.float32], calls: Iterable[DrawCall] | None = None) -> None:
+        """Draws into the bound framebuffer. The context must be current.
+
+        prepared: the scene.
+        clip: the matrix (4, 4) from positions relative to the eye to clip space.
+        calls: optional; the draw calls to execute. Default: all of the scene.
+        """
+        gl = self.context.gl
+        gl.enable_only(moderngl.DEPTH_TEST)
+        gl.depth_func = ">"
+        viewer = rounded(prepared.assembly.view.toward_viewer)
+        # A program keeps its uniforms from call to call, so those of the view and the lights are set only when they change.
+        placed: set[int] = set()
+        lit: dict[int, int] = {}
+        state: tuple[bool, ...] = ()
+        for call in prepared.calls if calls is None else calls:
+            program = call.program
+            if id(program) not in placed:
+                placed.add(id(program))
+                program.write("u_clip_from_world", clip)
+                program.write("u_viewer", viewer)
+            if lit.get(id(program)) != id(call.lights):
+                lit[id(program)] = id(call.lights)
+                for name, value in call.lights.items():
+                    program.write(name, value)
+            for name, value in call.values.items():
+                program.write(name, value)
+            for unit, (name, texture) in enumerate(call.samplers):
+                texture.use(unit)
+                program.set_integer(name, unit)
+            for binding, (key, buffer, count) in enumerate(call.pages):
+                buffer.bind_to_uniform_block(binding)
+                program.members[f"{key}_page"].binding = binding
+                program.set_integer(f"u_{key}_count", count)
+            wanted = (call.plan.alpha == "blend", call.added, not call.instance.back_faces, call.instance.mirrored)
+            if wanted != state:
+                state = wanted
+                self._set_state(*wanted)
+            call.vertices.render()
+        gl.fbo.depth_mask = True
+
     def _render(self, scene: Scene, dtype: DType, shading: Rate | None, tile: int | None) -> Image:
         film = scene.film
         transform = None
         if dtype == "uint8" and film.transformed:
             from glshade.image.view import ViewTransform
 
-            transform = ViewTransform.of(film)
-        passes = _passes(film, self.context.gl.max_samples)
-        # Drawn straight into 8 bits where nothing has to be averaged or added in linear light afterwards.
+            transform = ViewTransform.find(film.ocio, film.display, film.view)
+        sample_offsets = passes(film, self.context.gl.max_samples)
+        # A picture is drawn directly into 8 bits if no samples, layers or pages have to be averaged or added in linear light.
         direct = dtype == "uint8" and film.direct and scene.quality.storage in (None, "auto")
-        prepared = self._prepare(scene, shading, film.encoding if direct else "linear")
-        if direct and any(draw.added or draw.plan.alpha == "blend" for draw in prepared.draws):
+        prepared = self.prepare(scene, shading, film.encoding if direct else "linear")
+        if direct and (prepared.blends or any(call.added for call in prepared.calls)):
             direct = False
-            prepared = self._prepare(scene, shading, "linear")
+            prepared = self.prepare(scene, shading, "linear")
         left, top, width, height = film.window
-        on_gpu = dtype == "uint8" and len(passes) == 1 and transform is None
-        pixels = self._buffer((height, width, 4), np.uint8 if on_gpu else np.float32)
-        self._fill(prepared, passes, direct, tile, pixels)
+        on_gpu = dtype == "uint8" and len(sample_offsets) == 1 and transform is None
+        pixels = self.resources.pixels((height, width, 4), np.uint8 if on_gpu else np.float32)
+        self._fill(prepared, sample_offsets, direct, tile, pixels)
         image = Image(
             pixels[..., : len(film.background)],
             film.encoding if on_gpu else "linear",
@@ -219,91 +267,65 @@ class Renderer:
         return transform(image) if transform else image.encoded(film.encoding)
 
     def _fill(
-        self, prepared: Prepared, passes: list[tuple[float, float]], direct: bool, tile: int | None, out: NDArray[Any]
+        self, prepared: Prepared, sample_offsets: list[Offset], direct: bool, tile: int | None, out: NDArray[Any]
     ) -> None:
-        """Fills out (H, W, 4) with what the film shows, piece by piece."""
+        """Fills an array with the pixels of the film's window, piece by piece.
+
+        prepared: the scene.
+        sample_offsets: the offsets of the pictures to average [pixels].
+        direct: whether the programs write the encoded picture.
+        tile: the largest side that is drawn in one piece [pixels]; None for the default.
+        out: the array (H, W, 4), uint8 or float32.
+        """
         film = prepared.scene.film
         left, top, *size = film.window
-        # Several samples take several times the memory.
+        # With several samples per pixel, a frame takes several times the memory, so tiles are smaller.
         side = min(tile or (TILE if film.samples == 1 else TILE // 2), self.context.largest_side)
-        for piece, (x, y, w, h) in _pieces(film, side):
+        for piece, (x, y, w, h) in pieces(film, side):
             if [w, h] == size:
-                self._draw_piece(prepared, piece, (x, y, w, h), passes, direct, out)
+                self._draw_piece(prepared, piece, (x, y, w, h), sample_offsets, direct, out)
             else:
                 part = np.empty((h, w, 4), dtype=out.dtype)
-                self._draw_piece(prepared, piece, (x, y, w, h), passes, direct, part)
+                self._draw_piece(prepared, piece, (x, y, w, h), sample_offsets, direct, part)
                 out[y - top :, x - left :][:h, :w] = part
 
     def _draw_piece(
-        self,
-        prepared: Prepared,
-        piece: Box,
-        wanted: Box,
-        passes: list[tuple[float, float]],
-        direct: bool,
-        out: NDArray[Any],
+        self, prepared: Prepared, piece: Box, wanted: Box, sample_offsets: list[Offset], direct: bool, out: NDArray[Any]
     ) -> None:
-        """Fills out (h, w, 4) with what is `wanted` of the picture, drawn as part of a piece that may be larger."""
+        """Fills `out` (h, w, 4) with the wanted box of the picture. The box is part of a piece, which may be larger."""
         film = prepared.scene.film
         left, top, *size = piece
         x, y, w, h = wanted
         part = (x - left, y - top, w, h)
-        storage = "rgba8" if direct else _linear(prepared)
-        frame = self._frame((size[0], size[1]), storage, min(film.samples, self.context.gl.max_samples))
+        storage = "rgba8" if direct else prepared.linear_storage
+        frame = self.resources.frame((size[0], size[1]), storage, min(film.samples, self.context.gl.max_samples))
         background = _background(film.background, film.encoding if direct else "linear")
         whole = prepared.assembly.view.clip_from_world(self.context.zero_to_one)
-        # float64: the mean of equal numbers is that number.
-        total = np.zeros(out.shape) if len(passes) > 1 else None
-        for dx, dy in passes:
+        # The sum is float64, so that the mean of equal numbers is exactly that number.
+        total = np.zeros(out.shape) if len(sample_offsets) > 1 else None
+        for dx, dy in sample_offsets:
             clip = rounded(window(whole, film.size, left + dx, top + dy, *size))
             frame.begin(background, None if wanted == piece else part)
-            self._draw_all(prepared, clip)
+            self.draw(prepared, clip)
             if out.dtype == np.uint8 and not direct:
-                self._encode(frame, film.encoding).readback(out, part[:2])
+                self._encode(frame, film.encoding, prepared.shaders).readback(out, part[:2])
             elif total is None:
                 frame.readback(out, part[:2])
             else:
-                one = np.empty(out.shape, dtype=np.float32)
-                frame.readback(one, part[:2])
-                total += one
+                picture = np.empty(out.shape, dtype=np.float32)
+                frame.readback(picture, part[:2])
+                total += picture
         if total is not None:
-            out[...] = total / len(passes)
-
-    def _draw_all(self, prepared: Prepared, clip: NDArray[np.float32]) -> None:
-        gl = self.context.gl
-        gl.enable_only(moderngl.DEPTH_TEST)
-        gl.depth_func = ">"
-        viewer = rounded(prepared.assembly.view.toward_viewer)
-        placed: set[int] = set()
-        lit: dict[int, int] = {}
-        state: tuple[bool, ...] = ()
-        for draw in prepared.draws:
-            program = draw.program
-            if id(program) not in placed:
-                placed.add(id(program))
-                program.write("u_clip_from_world", clip)
-                program.write("u_viewer", viewer)
-            if lit.get(id(program)) != id(draw.lights):
-                lit[id(program)] = id(draw.lights)
-                for name, value in draw.lights.items():
-                    program.write(name, value)
-            for name, value in draw.values.items():
-                program.write(name, value)
-            for unit, (name, texture) in enumerate(draw.samplers):
-                texture.use(unit)
-                program.set_integer(name, unit)
-            for binding, (key, buffer, count) in enumerate(draw.pages):
-                buffer.bind_to_uniform_block(binding)
-                program.members[f"{key}_page"].binding = binding
-                program.set_integer(f"u_{key}_count", count)
-            wanted = (draw.plan.alpha == "blend", draw.added, not draw.instance.back_faces, draw.instance.mirrored)
-            if wanted != state:
-                state = wanted
-                self._set_state(*wanted)
-            draw.vertices.render()
-        gl.fbo.depth_mask = True
+            out[...] = total / len(sample_offsets)
 
     def _set_state(self, blended: bool, added: bool, culled: bool, mirrored: bool) -> None:
+        """Sets face culling, blending and the depth test for a draw call.
+
+        blended: whether the surface is blended over the pixels behind it.
+        added: whether the call draws a further page of lights.
+        culled: whether back faces are culled.
+        mirrored: whether the object's transform mirrors it, which reverses the winding of its triangles.
+        """
         gl = self.context.gl
         (gl.enable if culled else gl.disable)(moderngl.CULL_FACE)
         # The picture is drawn upside down so that row 0 is the top, which turns counter-clockwise into clockwise.
@@ -311,18 +333,20 @@ class Renderer:
         (gl.enable if blended or added else gl.disable)(moderngl.BLEND)
         if blended or added:
             one, rest = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-            # Light is added, opacity is not.
+            # A further page adds its light and leaves alpha as it is.
             gl.blend_func = (one, one, moderngl.ZERO, one) if added else (one, rest, one, rest)  # type: ignore[assignment]
-        # What is added falls on the very surface that its first page has drawn.
+        # Later pages of lights add to the fragments that the first page drew, so the depth test is "equal".
         gl.depth_func = "==" if added and not blended else ">"
         gl.fbo.depth_mask = not (blended or added)
 
-    def _encode(self, frame: Frame, encoding: Literal["linear", "srgb"]) -> Frame:
-        """An 8-bit frame of what `frame` holds in linear light."""
+    def _encode(self, frame: Frame, encoding: Encoding, shaders: Shaders) -> Frame:
+        """An 8-bit frame with the encoded colours of a frame in linear light."""
         texture = frame.resolve()
-        picture = self._frame(frame.size, "rgba8", 1)
-        output = {"output": f'#include "output/{encoding}.glsl"\n'}
-        program = self._program(Source(expand("pass/picture.vert", {}), expand("pass/picture.frag", output)))
+        picture = self.resources.frame(frame.size, "rgba8", 1)
+        source = encoder(encoding, shaders)
+        if not shaders.is_current(source.files):
+            source = encoder(encoding, current(self._folders))
+        program = self.resources.program(source)
         picture.target.scissor = frame.part  # type: ignore[assignment]
         picture.target.use()
         self.context.gl.enable_only(moderngl.NOTHING)
@@ -331,231 +355,20 @@ class Renderer:
         self.context.gl.vertex_array(program.gl, []).render(moderngl.TRIANGLES, vertices=3)
         return picture
 
-    def _prepare(
-        self, scene: Scene, shading: Rate | None, encoding: Literal["linear", "srgb"], part: Part | None = None
-    ) -> Prepared:
-        """Everything that does not change while the scene does not."""
-        key = (id(scene), shading, encoding, part)
-        kept = self._prepared.get(key)
-        if kept is None:
-            assembly = ready(scene, shading, part)
-            kept = Prepared(scene, assembly, list(self._draws(scene, assembly, encoding)))
-            self._prepared[key] = kept
-            if len(self._prepared) > KEPT_SCENES:
-                self._prepared.popitem(last=False)
-        self._prepared.move_to_end(key)
-        return kept
-
-    def _draws(self, scene: Scene, assembly: Assembly, encoding: Literal["linear", "srgb"]) -> Iterator[Draw]:
-        """Opaque objects by program, then blended ones from back to front."""
-        opaque: list[tuple[ProgramPlan, Instance]] = []
-        blended: list[tuple[ProgramPlan, Instance]] = []
-        shared: dict[tuple[ProgramPlan, tuple[int, ...]], tuple[Values, list[list[tuple[str, moderngl.Buffer, int]]]]] = {}
-        for instance in assembly.instances:
-            plan = plan_instance(instance, assembly, encoding)
-            (blended if plan.alpha == "blend" else opaque).append((plan, instance))
-        order = {plan: index for index, (plan, _) in reversed(list(enumerate(opaque)))}
-        opaque.sort(key=lambda pair: order[pair[0]])
-        if blended:
-            warnings.warn(
-                "blended surfaces are drawn back to front, triangle by triangle: approximate where they cross",
-                ApproximateWarning,
-                stacklevel=4,
-            )
-            middles = [i.world_from_object[:3, 3] + i.world_from_object[:3, :3] @ _middle(i) for _, i in blended]
-            depths = assembly.view.depth(np.array(middles))
-            blended = [blended[i] for i in np.argsort(-depths, kind="stable")]
-        exposure = scene.film.exposure
-        triangles = sum(len(instance.mesh.triangles) for instance in assembly.instances)
-        flat = self.context.is_software and triangles * FLAT_PIXELS <= scene.film.size[0] * scene.film.size[1]
-        for plan, instance in (*opaque, *blended):
-            key = (plan, instance.lights)
-            if key not in shared:
-                lights = light_uniforms(plan, assembly, instance.lights, exposure)
-                _check_finite(instance, lights)
-                shared[key] = lights, self._pages(plan, assembly, instance.lights, exposure)
-            yield from self._draw(plan, instance, assembly, exposure, flat, *shared[key])
-
-    def _draw(
-        self,
-        plan: ProgramPlan,
-        instance: Instance,
-        assembly: Assembly,
-        exposure: float,
-        flat: bool,
-        lights: Values,
-        pages: list[list[tuple[str, moderngl.Buffer, int]]],
-    ) -> Iterator[Draw]:
-        """The first draw of an instance, and one more for every further page of lights."""
-        blended = plan.alpha == "blend"
-        triangles = _back_to_front(instance, assembly) if blended else facing(instance, assembly.view)
-        for index in range(max((len(group) for group in pages), default=1)):
-            here = plan
-            if index:
-                # What is counted exactly, and ambient light, has been drawn with the first page.
-                many = tuple(group for group, of in zip(_paged(plan), pages, strict=True) if index < len(of))
-                here = replace(plan, lights=many, ambient="none", parameters=_without_ambient(plan, instance))
-            program = self._program(generate(here), flat)
-            values = object_uniforms(here, instance, assembly.view.eye)
-            if here.ambient == "constant":
-                values |= ambient_radiance(instance, assembly, exposure)
-            _check_finite(instance, values)
-            samplers = [(name, self._texture(wanted)) for name, wanted in textures(here, instance.material).items()]
-            vertices = self._vertices.array(instance.mesh, program, triangles)
-            page = [group[index] for group in pages if index < len(group)]
-            yield Draw(instance, here, program, vertices, values, samplers, {} if index else lights, page, bool(index))
-
-    def _pages(
-        self, plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...], exposure: float
-    ) -> list[list[tuple[str, moderngl.Buffer, int]]]:
-        result = []
-        for group in _paged(plan):
-            lights = [assembly.lights[i] for i in chosen if group.holds(assembly.lights[i])]
-            records = light_pages(group, lights, assembly.view.eye, exposure, PAGE)
-            whole = PAGE * records[0].dtype.itemsize
-            result.append([(group.key, self.context.gl.buffer(r.tobytes().ljust(whole, b"\0")), len(r)) for r in records])
-        return result
-
     def _attributes(self, prepared: Prepared) -> dict[str, str]:
-        """What a float picture says of its making."""
+        """The attributes of a float picture, which tell how it was made."""
         if prepared.attributes is None:
             prepared.attributes = {
                 "glshade:version": __version__,
                 "glshade:renderer": f"{self.context.renderer}; {self.context.version}",
-                "glshade:scene": digest(prepared.scene),
+                "glshade:scene": scene_digest(prepared.scene),
                 "glshade:camera": prepared.scene.camera.model_dump_json(exclude_none=True),
             }
         return prepared.attributes
 
-    def _program(self, source: Source, flat: bool = False) -> Program:
-        """flat: with what is uniform in the fragment stage as flat inputs; the pictures are the same."""
-        if (source, flat) not in self._programs:
-            written = with_flat_inputs(source, self.context.passed_vectors) if flat else source
-            self._programs[source, flat] = Program(self.context, written)
-        return self._programs[source, flat]
 
-    def _texture(self, texels: Texels) -> moderngl.Texture:
-        key = (texels, texels.path.stat().st_mtime_ns)
-        if key not in self._textures:
-            self._textures[key] = upload(self.context, texels)
-            if len(self._textures) > KEPT_TEXTURES:
-                self._textures.popitem(last=False)
-        return self._textures[key]
-
-    def _frame(self, size: tuple[int, int], storage: Storage, samples: int) -> Frame:
-        key = (size, storage, samples)
-        # The one used last stands last; the one that is being drawn into is never the first.
-        frame = self._frames.pop(key, None)
-        if frame is None:
-            if len(self._frames) > 2:
-                # Not released: what is forgotten is collected, and moderngl stumbles over what is both.
-                self._frames.pop(next(iter(self._frames)))
-            frame = Frame(self.context, size, storage, samples)
-        self._frames[key] = frame
-        return frame
-
-    def _buffer(self, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
-        """An array for a picture: one that no image holds any more, else a new one, which costs a page fault every 4 KiB."""
-        for buffer, held in zip(self._buffers, _references(self._buffers), strict=True):
-            if held == FREE and buffer.shape == shape and buffer.dtype == dtype:
-                return buffer
-        self._buffers = [*self._buffers[-1:], np.empty(shape, dtype=dtype)]
-        return self._buffers[-1]
-
-
-def _references(arrays: list[NDArray[Any]]) -> list[int]:
-    """How often each array is referred to; the list's own, and this function's, count too."""
-    return [sys.getrefcount(array) for array in arrays]
-
-
-# What _references counts for an array that nobody else holds: it differs between versions of Python.
-FREE = _references([np.empty(0)])[0]
-
-
-def _linear(prepared: Prepared) -> Storage:
-    """What linear light is kept in. Errors: SceneError for one that has nothing below zero under a negative light."""
-    chosen = prepared.scene.quality.storage
-    if chosen is None or chosen == "auto":
-        return "rgba32f"
-    if chosen == "r11f_g11f_b10f" and any(light.is_negative for light in prepared.assembly.lights):
-        raise SceneError("quality.storage: r11f_g11f_b10f has nothing below zero, and a light of this scene is negative")
-    if FORMATS[chosen][1] == 3 and (len(prepared.scene.film.background) == 4 or _blends(prepared)):
-        raise SceneError(f"quality.storage: {chosen} has no alpha, which this scene asks for")
-    return chosen
-
-
-def _blends(prepared: Prepared) -> bool:
-    return any(draw.plan.alpha == "blend" for draw in prepared.draws)
-
-
-def _check_finite(instance: Instance, values: Values) -> None:
-    """Errors: SceneError that names what is not finite."""
-    for name, value in values.items():
-        if not np.isfinite(value).all():
-            raise SceneError(f"{instance.name}: {name.removeprefix('u_')} is too large for float32")
-
-
-def _paged(plan: ProgramPlan) -> list[Any]:
-    return [group for group in plan.lights if group.count == 0]
-
-
-def _without_ambient(plan: ProgramPlan, instance: Instance) -> tuple[tuple[str, str], ...]:
-    lit = instance.material.asked("light")
-    return tuple((name, use if name in lit else "unused") for name, use in plan.parameters)
-
-
-def _middle(instance: Instance) -> NDArray[np.float64]:
-    middle: NDArray[np.float64] = instance.mesh.positions.mean(axis=0, dtype=np.float64)
-    return middle
-
-
-def _back_to_front(instance: Instance, assembly: Assembly) -> NDArray[np.uint32]:
-    centroids = instance.mesh.positions[instance.mesh.triangles].mean(axis=1, dtype=np.float64)
-    world = centroids @ instance.world_from_object[:3, :3].T + instance.world_from_object[:3, 3]
-    return instance.mesh.triangles[np.argsort(-assembly.view.depth(world), kind="stable")]
-
-
-def _sample_passes(samples: int, available: int) -> list[tuple[float, float]]:
-    """Offsets [pixels] of the pictures that make up the samples: one, or several where the driver has too few of its own."""
-    count = max(1, -(-samples // max(available, 1)))
-    # Together with a driver's rotated grid of `available`, no two samples share a row or a column.
-    share = 1 / (count * max(available, 1))
-    return [((i - (count - 1) / 2) * share, (3 * i % count - (count - 1) / 2) * share) for i in range(count)]
-
-
-def _passes(film: Film, available: int) -> list[tuple[float, float]]:
-    """Offsets [pixels] of all the pictures whose mean is the picture: spread evenly over a pixel, and over a sample's share."""
-    n = film.supersample
-    shifts = [(i + 0.5) / n - 0.5 for i in range(n)]
-    samples = _sample_passes(film.samples, available)
-    return [(x + dx, y + dy) for y in shifts for x in shifts for dx, dy in samples]
-
-
-def _pieces(film: Film, side: int) -> Iterator[tuple[Box, Box]]:
-    """(what is drawn in one piece, what of it is wanted), boxes of the whole picture.
-
-    Pieces, `side` large at most, are those of the whole picture, so that a crop of it has the same bits.
-    """
-    width, height = film.size
-    left, top, w, h = film.window
-    # At the border of what it draws, a driver moves a centroid to the samples that are there; an apron keeps that out.
-    apron = 2 if film.samples > 1 and max(width, height) > side else 0
-    # An even number: derivatives are taken in blocks of two by two pixels, which must not shift.
-    side = max((side - 2 * apron) & ~1, 2)
-    for x in range(left // side * side, left + w, side):
-        for y in range(top // side * side, top + h, side):
-            x0, y0 = max(x - apron, 0), max(y - apron, 0)
-            x1, y1 = max(x, left), max(y, top)
-            yield (
-                (x0, y0, min(x + side + apron, width) - x0, min(y + side + apron, height) - y0),
-                (x1, y1, min(x + side, left + w) - x1, min(y + side, top + h) - y1),
-            )
-
-
-def _background(colour: tuple[float, ...], encoding: Literal["linear", "srgb"]) -> tuple[float, float, float, float]:
-    """Four numbers, premultiplied, encoded as the frame is."""
-    from glshade.image.srgb import linear_to_srgb
-
+def _background(colour: tuple[float, ...], encoding: Encoding) -> tuple[float, float, float, float]:
+    """The background as red, green, blue and alpha, premultiplied and encoded for the frame."""
     alpha = colour[3] if len(colour) == 4 else 1.0
     rgb = [c * alpha for c in colour[:3]]
     r, g, b = (float(c) for c in (linear_to_srgb(np.array(rgb)) if encoding == "srgb" else rgb))
@@ -569,7 +382,12 @@ def render(
     shading: Rate | None = None,
     backend: Backend = "auto",
     device: int | None = None,
+    shaders: Folders | None = None,
+    models: Folders | None = None,
 ) -> Image:
-    """One picture, on a context of its own; for several, keep a Renderer. Arguments and errors as there."""
-    with Renderer(backend, device) as renderer:
+    """The picture of a scene, drawn on a new context. For several pictures, one Renderer is faster.
+
+    The arguments and errors are those of Renderer and Renderer.render.
+    """
+    with Renderer(backend, device, shaders=shaders, models=models) as renderer:
         return renderer.render(scene, dtype=dtype, shading=shading)

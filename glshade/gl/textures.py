@@ -1,4 +1,4 @@
-"""Textures on the GPU: float32 and linear, so that filtering is exact to float and sRGB is decoded before it is averaged."""
+"""Textures: uploads pictures to the GPU as linear float32, so that filtering has float precision and averages linear values."""
 
 from __future__ import annotations
 
@@ -10,11 +10,17 @@ from glshade.gl.context import GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP
 from glshade.textures.mipmap import levels
 from glshade.textures.texels import Texels
 
+# Wrap mode -> value in Khronos' registry (gl.xml).
 WRAP = {"repeat": 0x2901, "clamp": 0x812F, "mirror": 0x8370}
 
 
 def upload(context: Context, texels: Texels) -> moderngl.Texture:
-    """The texture, trilinear, with its wrap modes. Errors: AssetError."""
+    """A texture with trilinear filtering. Levels that are larger than the driver allows are left out.
+
+    context: the context, which must be current.
+    texels: the picture and its wrap modes.
+    Errors: AssetError.
+    """
     chain = list(levels(texels.read()))
     while max(chain[0].shape[:2]) > context.largest_side:
         chain.pop(0)
@@ -31,10 +37,10 @@ def upload(context: Context, texels: Texels) -> moderngl.Texture:
 
 
 def _mirror(context: Context, texture: moderngl.Texture, wrap: tuple[str, str]) -> None:
-    """moderngl knows repeat and clamp alone."""
+    """Sets the wrap modes of a texture through OpenGL, because moderngl has no mirrored repeat."""
     parameter = context.procedure("glTexParameteri", None, ctypes.c_uint, ctypes.c_uint, ctypes.c_int)
     if parameter is not None:
+        # glTexParameteri changes the texture that is bound to the active unit.
         texture.use(0)
-        # moderngl binds on the default unit when it makes a texture, and leaves the active unit at the one it used last.
         for axis, mode in zip((GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T), wrap, strict=True):
             parameter(GL_TEXTURE_2D, axis, WRAP[mode])

@@ -1,4 +1,4 @@
-"""Vertices: meshes on the GPU, with the attributes that a program asks for and no others."""
+"""Vertices: uploads meshes to the GPU, with only the attributes that a program reads."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from glshade.gl.context import Context
 from glshade.gl.program import Program
 from glshade.mesh.mesh import Mesh
 
+# Attribute in GLSL -> (attribute of Mesh, number of components).
 ATTRIBUTES = {
     "a_position": ("positions", 3),
     "a_normal": ("normals", 3),
@@ -26,21 +27,26 @@ ATTRIBUTES = {
 
 
 class Vertices:
-    """The buffers of a context, by mesh; they go when their mesh goes."""
+    """The vertex buffers and vertex arrays of a context. They are freed together with their mesh."""
 
     def __init__(self, context: Context) -> None:
         self._context = context
         self._buffers: WeakKeyDictionary[Mesh, dict[tuple[str, ...], moderngl.Buffer]] = WeakKeyDictionary()
-        self._arrays: WeakKeyDictionary[Mesh, dict[Program, moderngl.VertexArray]] = WeakKeyDictionary()
+        self._arrays: WeakKeyDictionary[Mesh, WeakKeyDictionary[Program, moderngl.VertexArray]] = WeakKeyDictionary()
 
     def array(self, mesh: Mesh, program: Program, triangles: NDArray[np.uint32] | None = None) -> moderngl.VertexArray:
-        """The mesh, ready to be drawn by the program. triangles: (N, 3), those to draw; None: all."""
+        """The vertex array that draws a mesh with a program.
+
+        mesh: the mesh to draw.
+        program: the program to draw it with.
+        triangles: optional; the triangles (N, 3) to draw. Such an array is not cached. Default: all triangles of the mesh.
+        """
         if triangles is not None:
             return self._array(mesh, program, self._context.gl.buffer(triangles.data))
-        kept = self._arrays.setdefault(mesh, {})
-        if program not in kept:
-            kept[program] = self._array(mesh, program, self._buffer(mesh, (), mesh.triangles.tobytes))
-        return kept[program]
+        arrays = self._arrays.setdefault(mesh, WeakKeyDictionary())
+        if program not in arrays:
+            arrays[program] = self._array(mesh, program, self._buffer(mesh, (), mesh.triangles.tobytes))
+        return arrays[program]
 
     def _array(self, mesh: Mesh, program: Program, indices: moderngl.Buffer) -> moderngl.VertexArray:
         names = tuple(name for name in program.attributes if name in ATTRIBUTES)
@@ -50,13 +56,13 @@ class Vertices:
         return self._context.gl.vertex_array(program.gl, [(buffer, layout, *names)], indices)
 
     def _buffer(self, mesh: Mesh, key: tuple[str, ...], data: Callable[[], bytes]) -> moderngl.Buffer:
-        """key: the attributes; none for the triangles."""
-        kept = self._buffers.setdefault(mesh, {})
-        if key not in kept:
-            kept[key] = self._context.gl.buffer(data())
-        return kept[key]
+        """The cached buffer of a mesh. key: the attributes that it holds; empty for the buffer of triangles."""
+        buffers = self._buffers.setdefault(mesh, {})
+        if key not in buffers:
+            buffers[key] = self._context.gl.buffer(data())
+        return buffers[key]
 
 
 def _interleaved(mesh: Mesh, names: tuple[str, ...]) -> bytes:
-    """Vertex after vertex: what one vertex needs lies together."""
+    """The attributes of a mesh as bytes, vertex after vertex, so that the data of one vertex lies together."""
     return np.hstack([getattr(mesh, ATTRIBUTES[name][0]) for name in names]).tobytes()

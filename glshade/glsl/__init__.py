@@ -1,1 +1,1 @@
-"""GLSL: which programs a scene needs, their text, and the values that they are given. No OpenGL here."""
+"""GLSL: the programs that a scene needs, their text and the values of their uniforms. Nothing here calls OpenGL."""

@@ -1,7 +1,7 @@
-"""Definitions: the functions, structs and constants of a stage's text, and which of them main() leads to.
+"""Definitions: the functions, structs and constants of a stage's text, and which of them main() reaches.
 
-It reads GLSL as this repository writes it (clang-format sees to that): whatever is defined starts in a line's first column,
-and so does the brace that ends it.
+The module reads only GLSL that clang-format has formatted: each definition starts in the first column of a line, and so does
+the brace that closes it.
 """
 
 from __future__ import annotations
@@ -20,8 +20,15 @@ _WORD = re.compile(r"[A-Za-z_]\w*")
 
 @dataclass(frozen=True)
 class Definition:
-    """One definition. arguments: how many a function takes. lines [first, end): where it stands, with the comment right above
-    it; code: its text without comments."""
+    """One definition of a stage's text.
+
+    kind: function, struct or const.
+    name: the name that it defines.
+    arguments: the number of arguments of a function, 0 otherwise.
+    first: the index of its first line, counting the comment directly above it.
+    end: the index after its last line.
+    code: its text without comments.
+    """
 
     kind: Literal["function", "struct", "const"]
     name: str
@@ -36,9 +43,9 @@ def uncommented(text: str) -> str:
     return re.sub(r"//.*", "", text)
 
 
-def definitions(lines: Sequence[str]) -> list[Definition]:
-    """What a text defines, in its order."""
-    found: list[Definition] = []
+def find_definitions(lines: Sequence[str]) -> list[Definition]:
+    """The definitions in a text, in their order."""
+    definitions: list[Definition] = []
     at = 0
     while at < len(lines):
         head = _HEAD.match(lines[at])
@@ -47,46 +54,47 @@ def definitions(lines: Sequence[str]) -> list[Definition]:
             continue
         kind: Literal["function", "struct", "const"]
         kind = "const" if head["const"] else "struct" if head["struct"] else "function"
-        over = (lambda line: ";" in line) if kind == "const" else (lambda line: line.startswith("}"))
-        end = next((i for i in range(at, len(lines)) if over(uncommented(lines[i]))), len(lines) - 1)
+        is_last = (lambda line: ";" in line) if kind == "const" else (lambda line: line.startswith("}"))
+        end = next((i for i in range(at, len(lines)) if is_last(uncommented(lines[i]))), len(lines) - 1)
         first = at
         while first > 0 and lines[first - 1].startswith("//"):
             first -= 1
         code = uncommented("\n".join(lines[at : end + 1]))
         arguments = _arguments(code, code.index("(")) if kind == "function" else 0
-        found.append(Definition(kind, head[kind], arguments, first, end + 1, code))
+        definitions.append(Definition(kind, head[kind], arguments, first, end + 1, code))
         at = end + 1
-    return found
+    return definitions
 
 
 def unreached(lines: Sequence[str]) -> list[Definition]:
-    """The definitions that neither main() nor what is declared beside them (uniforms, inputs, outputs) leads to."""
-    found = definitions(lines)
-    inside = {i for one in found for i in range(one.first, one.end)}
-    beside = uncommented("\n".join(line for i, line in enumerate(lines) if i not in inside))
+    """The definitions that neither main() nor any uniform, input or output uses, directly or through other definitions."""
+    definitions = find_definitions(lines)
+    inside = {i for definition in definitions for i in range(definition.first, definition.end)}
+    declarations = uncommented("\n".join(line for i, line in enumerate(lines) if i not in inside))
     reached: set[Definition] = set()
-    ahead = [one for one in found if one.name == "main"] + list(_named(beside, found))
-    while ahead:
-        one = ahead.pop()
-        if one not in reached:
-            reached.add(one)
-            ahead += _named(one.code, found)
-    return [one for one in found if one not in reached]
+    pending = [definition for definition in definitions if definition.name == "main"]
+    pending += _named(declarations, definitions)
+    while pending:
+        definition = pending.pop()
+        if definition not in reached:
+            reached.add(definition)
+            pending += _named(definition.code, definitions)
+    return [definition for definition in definitions if definition not in reached]
 
 
 def _named(code: str, known: Iterable[Definition]) -> Iterable[Definition]:
-    """What some code names: structs and constants by their word, functions by name and number of arguments."""
+    """The known definitions that some code uses. Functions are matched by their name and number of arguments."""
     words = set(_WORD.findall(code))
     calls = {(call[1], _arguments(code, call.end() - 1)) for call in _CALL.finditer(code)}
-    for one in known:
-        # A call that does not end is a fault, which the driver shall see.
-        called = (one.name, one.arguments) in calls or (one.name, -1) in calls
-        if called if one.kind == "function" else one.name in words:
-            yield one
+    for definition in known:
+        # A call without a closing bracket (-1) counts as a use, so that the driver sees the function and reports the error.
+        is_called = (definition.name, definition.arguments) in calls or (definition.name, -1) in calls
+        if is_called if definition.kind == "function" else definition.name in words:
+            yield definition
 
 
 def _arguments(code: str, opening: int) -> int:
-    """How many arguments stand between the bracket at `opening` and its partner; -1 where there is none."""
+    """The number of arguments between the bracket at index `opening` and the one that closes it; -1 if none closes it."""
     depth, count = 0, 1
     for i in range(opening, len(code)):
         depth += (code[i] == "(") - (code[i] == ")")

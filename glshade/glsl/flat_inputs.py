@@ -1,57 +1,82 @@
-"""Flat inputs: what is uniform in the fragment stage, handed on by the vertex stage instead. No GL.
+"""Flat inputs: a program form in which the fragment stage receives its uniforms as flat inputs from the vertex stage.
 
-llvmpipe (Mesa 22.3) gathers a uniform anew for every eight pixels, lane by lane, in two dozen instructions a number; what a
-triangle hands on unchanged it loads once for sixteen. A picture with eight point lights takes 0.7 times as long. But every
-triangle carries them, so this is for few triangles on many pixels. The numbers are the same to the bit, and so is the picture.
+llvmpipe (Mesa 22.3) reloads a uniform for every eight pixels, one SIMD lane after the other, with about 24 instructions per
+number. It loads a flat input once for sixteen pixels: a picture with eight point lights takes 0.7 times as long. But every
+triangle carries its flat inputs, so this form saves time only if few triangles cover many pixels. The pictures are the same to
+the bit.
 """
 
 from __future__ import annotations
 
-import re
 from functools import lru_cache
+from typing import Literal
 
-from glshade.glsl.generator import Source, Stage
+from glshade.glsl.source import Declaration, Source, Stage
 
-# As source.py declares the numbers of lights and materials.
-_UNIFORM = re.compile(r"uniform (?P<type>float|vec[234]) u_(?P<name>\w+?)(?P<array>\[(?P<count>\d+)\])?;")
-_INPUT = re.compile(r"(flat |centroid )?in \w+ \w+;")
+# The types of uniforms that become flat inputs. Each takes one of the vectors that pass between the stages; a matrix takes
+# more.
+TYPES = frozenset({"float", "vec2", "vec3", "vec4"})
 _MAIN = "void main() {"
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=256)
 def with_flat_inputs(source: Source, room: int) -> Source:
-    """The same program with its fragment stage's uniforms as flat inputs, from the first as far as the room goes.
+    """The program, with uniforms of its fragment stage turned into flat inputs: the first ones, as many as fit.
 
-    room: how many vectors the driver passes between the stages (GL_MAX_VARYING_VECTORS).
+    source: the program.
+    room: the number of vectors that the driver passes between the stages (GL_MAX_VARYING_VECTORS).
     """
-    fragment = source.fragment
-    if fragment is None:
+    if source.fragment is None:
         return source
-    lines = fragment.text.splitlines()
-    # Each element of an array takes a vector's place, and so may a single number.
-    room -= sum(bool(_INPUT.fullmatch(line)) for line in lines)
-    handed: list[re.Match[str]] = []
-    for index, line in enumerate(lines):
-        found = _UNIFORM.fullmatch(line)
-        if found and int(found["count"] or 1) <= room:
-            room -= int(found["count"] or 1)
-            lines[index] = f"flat in {found['type']} u_{found['name']}{found['array'] or ''};"
-            handed.append(found)
+    # Each element of an array takes a whole vector, and a single number may take one too.
+    room -= sum(1 for _ in source.fragment.declarations("in"))
+    handed: dict[int, Declaration] = {}
+    for line, uniform in source.fragment.declared:
+        if uniform.storage == "uniform" and uniform.type in TYPES and max(uniform.count, 1) <= room:
+            room -= max(uniform.count, 1)
+            handed[line] = uniform
     if not handed:
         return source
-    text = "".join(f"{line}\n" for line in lines)
-    for found in handed:
-        text = re.sub(rf"\bu_{found['name']}\b", f"v_u_{found['name']}", text)
-    return Source(_handing_on(source.vertex, handed), Stage(text, fragment.lines))
+    return Source(_handing_on(source.vertex, list(handed.values())), _receiving(source.fragment, handed))
 
 
-def _handing_on(vertex: Stage, handed: list[re.Match[str]]) -> Stage:
-    """The vertex stage with the uniforms, and with outputs that it sets to them."""
-    lines, places = vertex.text.splitlines(), list(vertex.lines)
-    main = lines.index(_MAIN)
-    body = [f"    v_u_{one['name']} = u_{one['name']};" for one in handed]
-    head = [one[0] for one in handed if one[0] not in lines]
-    head += [f"flat out {one['type']} v_u_{one['name']}{one['array'] or ''};" for one in handed]
-    lines[main : main + 1] = [*head, _MAIN, *body]
-    places[main : main + 1] = [("<flat inputs>", i + 1) for i in range(len(head) + 1 + len(body))]
-    return Stage("".join(f"{line}\n" for line in lines), tuple(places))
+def _receiving(fragment: Stage, handed: dict[int, Declaration]) -> Stage:
+    """The fragment stage with inputs in place of uniforms. A macro keeps each uniform's name valid in the rest of the text."""
+    text: list[str] = []
+    lines: list[tuple[str, int]] = []
+    declared: list[tuple[int, Declaration]] = []
+    known = dict(fragment.declared)
+    for number, line in enumerate(fragment.text.splitlines()):
+        uniform = handed.get(number)
+        declaration = known.get(number) if uniform is None else _input(uniform, "in")
+        if declaration is not None:
+            declared.append((len(text), declaration))
+        if uniform is not None:
+            text += [str(_input(uniform, "in")), f"#define {uniform.name} {_input(uniform, 'in').name}"]
+            lines += [fragment.lines[number]] * 2
+        else:
+            text.append(line)
+            lines.append(fragment.lines[number])
+    return Stage("".join(f"{line}\n" for line in text), tuple(lines), tuple(declared))
+
+
+def _handing_on(vertex: Stage, handed: list[Declaration]) -> Stage:
+    """The vertex stage with the uniforms declared and copied to outputs."""
+    text = vertex.text.splitlines()
+    main = text.index(_MAIN)
+    present = {declaration.name for declaration in vertex.declarations("uniform")}
+    added = [uniform for uniform in handed if uniform.name not in present]
+    added += [_input(uniform, "out") for uniform in handed]
+    body = [f"    {_input(uniform, 'out').name} = {uniform.name};" for uniform in handed]
+    inserted = [*map(str, added), _MAIN, *body]
+    text[main : main + 1] = inserted
+    lines = list(vertex.lines)
+    lines[main : main + 1] = [("<flat inputs>", number) for number in range(1, len(inserted) + 1)]
+    # The lines are inserted at main(), after all declarations, so the indices of the earlier ones do not change.
+    declared = [*vertex.declared, *((main + number, declaration) for number, declaration in enumerate(added))]
+    return Stage("".join(f"{line}\n" for line in text), tuple(lines), tuple(declared))
+
+
+def _input(uniform: Declaration, storage: Literal["in", "out"]) -> Declaration:
+    """The flat output of the vertex stage ("out") or flat input of the fragment stage ("in") that carries a uniform."""
+    return Declaration(storage, uniform.type, f"v_{uniform.name}", uniform.count, "flat")

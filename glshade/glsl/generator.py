@@ -1,195 +1,192 @@
-"""Source: the text of a program's stages, and where each line came from. No GL.
-
-The files under shaders/ are whole GLSL that any tool can read; a plan chooses among them, and what is left to write (the
-uniforms, the light loops) is generated into the places that the passes name in angle brackets: `#include <surface>`.
-"""
+"""Generator: writes the GLSL of the program that a plan describes."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
-from dataclasses import dataclass
-from functools import lru_cache
-from pathlib import Path
+from collections.abc import Callable
+from weakref import WeakKeyDictionary
 
-from glshade.brdfs import BRDFS, Parameter
-from glshade.document import nearest
-from glshade.errors import ShaderError
+from glshade.brdfs import BRDFS, Brdf, Parameter, Slot
 from glshade.glsl.definitions import unreached
-from glshade.glsl.plan import PAGE as PAGE
-from glshade.glsl.plan import LightGroup, ProgramPlan, channel
-from glshade.lights import LIGHTS
+from glshade.glsl.plan import PAGE, LightGroup, ProgramPlan, channel
+from glshade.glsl.shaders import Shaders, current, expand
+from glshade.glsl.source import Code, Source, Stage
+from glshade.lights import FALLOFFS, LIGHTS
+from glshade.lru import Lru
 
-# Inside a wheel the shaders lie beside this module; in a checkout, beside the package.
-_PACKAGE = Path(__file__).parent.parent
-_INSTALLED = _PACKAGE / "_shaders"
-SHADERS = _INSTALLED if _INSTALLED.is_dir() else _PACKAGE.parent / "shaders"
+# The size of the cache of sources for one set of shader files [bytes]: about two thousand programs.
+KEPT_SOURCES = 32 << 20
 
-_INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One stage's text. lines[i]: (file, line) of the text's line i + 1; generated text has its name in brackets as file."""
-
-    text: str
-    lines: tuple[tuple[str, int], ...]
-
-    def __hash__(self) -> int:
-        # Asked once an object of a scene; a text remembers its own.
-        return hash(self.text)
-
-    def place(self, line: int) -> str:
-        """`file:line` of a line of the text, counted from 1."""
-        file, number = self.lines[min(max(line, 1), len(self.lines)) - 1]
-        return f"{file}:{number}"
+_sources: WeakKeyDictionary[Shaders, Lru[ProgramPlan | str, Source]] = WeakKeyDictionary()
 
 
-@dataclass(frozen=True)
-class Source:
-    """A program's text. Without a fragment stage, what the vertex stage writes is captured."""
+def generate(plan: ProgramPlan, shaders: Shaders | None = None) -> Source:
+    """The text of the program that a plan describes. The same plan and the same files give the same text.
 
-    vertex: Stage
-    fragment: Stage | None
-
-
-def expand(name: str, generated: Mapping[str, str], root: Path | None = None, fast: bool = False) -> Stage:
-    """The file `name` under the shader folder with its includes in place, each once.
-
-    generated: text for the includes in angle brackets. fast: a file that has another of its name under fast/ gives way to it.
-    Errors: ShaderError for a file that is not there.
+    plan: the features of the program.
+    shaders: optional; the shader files. Default: those that ship with glshade.
+    Errors: ShaderError.
     """
-    root = root or SHADERS
-    text: list[str] = []
-    lines: list[tuple[str, int]] = []
-    seen = {name}
-
-    def read(path: str, asked_from: str) -> list[str]:
-        try:
-            return (root / path).read_text(encoding="utf-8").splitlines()
-        except OSError:
-            names = [str(p.relative_to(root)) for p in root.rglob("*") if p.is_file()]
-            raise ShaderError(f'{asked_from}: no shader file "{path}"{nearest(path, names)}') from None
-
-    def walk(file: str, source: list[str]) -> None:
-        for number, line in enumerate(source, 1):
-            include = _INCLUDE.match(line)
-            if include is None:
-                text.append(line)
-                lines.append((file, number))
-                continue
-            path, slot = include.groups()
-            path = f"fast/{path}" if fast and path and (root / "fast" / path).is_file() else path
-            wanted = path or f"<{slot}>"
-            if wanted in seen:
-                continue
-            seen.add(wanted)
-            if path is not None:
-                walk(str(root / path), read(path, f"{file}:{number}"))
-            elif slot in generated:
-                walk(wanted, generated[slot].splitlines())
-            else:
-                raise ShaderError(f"{file}:{number}: nothing is generated for <{slot}>{nearest(slot, generated)}")
-
-    walk(str(root / name), read(name, name))
-    return Stage("\n".join(text) + "\n", tuple(lines))
+    return _kept(plan, shaders or current(), lambda shaders: _generated(plan, shaders))
 
 
-def without_unreached(stage: Stage) -> Stage:
-    """The stage without the functions, structs and constants that its files define for others."""
-    lines = stage.text.splitlines()
-    gone = {i for one in unreached(lines) for i in range(one.first, one.end)}
-    kept = [i for i in range(len(lines)) if i not in gone]
-    return Stage("".join(f"{lines[i]}\n" for i in kept), tuple(stage.lines[i] for i in kept))
+def encoder(encoding: str, shaders: Shaders) -> Source:
+    """The program that copies a picture in linear light to an encoded one.
+
+    encoding: the name of a file in shaders/output.
+    shaders: the shader files.
+    Errors: ShaderError.
+    """
+    output = {"output": Code().include(f"output/{encoding}.glsl")}
+
+    def make(shaders: Shaders) -> Source:
+        return Source(expand("pass/picture.vert", {}, shaders), expand("pass/picture.frag", output, shaders))
+
+    return _kept(encoding, shaders, make)
 
 
-@lru_cache(maxsize=1024)
-def generate(plan: ProgramPlan) -> Source:
-    """The text of the program that `plan` describes. The same plan gives the same text."""
-    name = plan.rate + ("_both" if plan.both_sides else "")
-    slots = dict(plan.slots)
+def _kept(key: ProgramPlan | str, shaders: Shaders, make: Callable[[Shaders], Source]) -> Source:
+    """The source of a key, from the cache of these shaders; `make` is called if it is not there."""
+    kept = _sources.setdefault(shaders, Lru(KEPT_SOURCES))
+    return kept.find(key, lambda: make(shaders), _size)
+
+
+def _size(source: Source) -> int:
+    """The approximate size of a source in memory [bytes]: its text, and a tuple of 120 bytes for each line."""
+    return sum(len(stage.text) + 120 * len(stage.lines) for stage in source.stages)
+
+
+def _generated(plan: ProgramPlan, shaders: Shaders) -> Source:
+    name = f"{plan.rate}_both" if plan.both_sides else plan.rate
+    filled = slot_code(dict(plan.slots))
     if plan.rate == "phong":
         vertex = {"surface": _interpolated(plan)}
-        fragment = {**slots, "surface": _shading(plan, _Interpolated(plan)) + _alpha(plan)}
+        fragment = {**filled, "surface": _shading(plan, _Interpolated(plan)).join(_alpha(plan))}
         vertex_pass, fragment_pass = "phong.vert", f"{name}.frag"
     else:
-        vertex = {**slots, "surface": _shading(plan, _AtVertex(plan)) + _alpha_inputs(plan, "out")}
-        fragment = {"surface": _alpha_inputs(plan, "in") + _alpha(plan)}
+        vertex = {**filled, "surface": _shading(plan, _AtVertex(plan)).join(_alpha_inputs(plan, "out"))}
+        fragment = {"surface": _alpha_inputs(plan, "in").join(_alpha(plan))}
         vertex_pass = f"{name}.vert"
         fragment_pass = f"{name}.frag" if plan.rate == "gouraud" else "flat.frag"
-    fragment["output"] = f'#include "output/{plan.encoding}.glsl"\n'
+    fragment["output"] = Code().include(f"output/{plan.encoding}.glsl")
     fast = plan.arithmetic == "fast"
-    stages = (expand(f"pass/{vertex_pass}", vertex, fast=fast), expand(f"pass/{fragment_pass}", fragment, fast=fast))
+    stages = (
+        expand(f"pass/{vertex_pass}", vertex, shaders, fast),
+        expand(f"pass/{fragment_pass}", fragment, shaders, fast),
+    )
     return Source(*map(without_unreached, stages))
 
 
+def slot_code(slots: dict[str, Slot]) -> dict[str, Code]:
+    """Place -> code, for the lines `#include <place>` of a model's file. The material decides the code of each place."""
+    return {place: Code().include(*slot.includes).add(slot.text) for place, slot in slots.items()}
+
+
+def model_code(brdf: Brdf, function: str, frame: str) -> dict[str, Code]:
+    """Place -> code, for a program that evaluates one model.
+
+    The place `model` holds the model's file, its parameters as uniforms and one function; the other places are its slots.
+    brdf: the model with its parameters, which must not be textures.
+    function: the head of the function, for example `vec3 value(vec3 l, vec3 v)`.
+    frame: the GLSL expression of the shading frame in that function.
+    """
+    names = list(brdf.parameters())
+    code = Code().include(f"brdf/{brdf.brdf}.glsl")
+    for name in names:
+        code.uniform("vec3" if brdf.is_colour(name) else "float", f"u_{name}")
+    struct = f"{BRDFS.class_name(brdf.brdf)}({', '.join(f'u_{name}' for name in names)})"
+    code.add(f"\n{function} {{\n    return brdf_cos({struct}, {frame}, l, v);\n}}\n")
+    return {**slot_code(brdf.slots()), "model": code}
+
+
+def without_unreached(stage: Stage) -> Stage:
+    """The stage without the functions, structs and constants that main() does not reach."""
+    lines = stage.text.splitlines()
+    removed = {i for definition in unreached(lines) for i in range(definition.first, definition.end)}
+    return stage.only([i for i in range(len(lines)) if i not in removed])
+
+
 class _Interpolated:
-    """The names of a surface's quantities in the fragment stage."""
+    """The expressions of a surface's quantities in the fragment stage, and their declarations."""
 
     def __init__(self, plan: ProgramPlan) -> None:
         self.position, self.normal, self.tangent = "v_position", "v_normal", "v_tangent"
         self.uv, self.colour = "v_uv", "v_colour"
-        self.declarations = _varyings(plan, "in")
+        self.declarations = _varyings(_handed_on(plan), "in")
 
 
 class _AtVertex:
-    """The same in the vertex stage; a flat triangle is shaded at its centroid."""
+    """The expressions of a surface's quantities in the vertex stage, and their declarations.
+
+    With flat shading the position, uv and colour are those of the triangle's centroid.
+    """
 
     def __init__(self, plan: ProgramPlan) -> None:
         at = "a_centroid_" if plan.rate == "flat" else "a_"
         self.position = "world(a_centroid)" if plan.rate == "flat" else "world(a_position)"
         self.normal, self.tangent = "world_normal(a_normal)", "world_tangent(a_tangent)"
         self.uv, self.colour = f"{at}uv", f"{at}colour"
-        attributes = [
-            f"in {TYPES[name]} {at if name in ('uv', 'colour') else 'a_'}{name};"
-            for name in _wanted(plan)
-            if name != "position"
-        ]
-        attributes += ["in vec3 a_centroid;"] * (plan.rate == "flat" and plan.positions)
-        self.declarations = "".join(f"{line}\n" for line in attributes) + _transforms(plan)
+        self.declarations = Code()
+        for name in _wanted(plan):
+            if name != "position":
+                self.declarations.input(TYPES[name], f"{at if name in ('uv', 'colour') else 'a_'}{name}")
+        if plan.rate == "flat" and plan.positions:
+            self.declarations.input("vec3", "a_centroid")
+        self.declarations.join(_transforms(plan))
 
 
 TYPES = {"position": "vec3", "normal": "vec3", "tangent": "vec4", "uv": "vec2", "colour": "vec4"}
 
 
 def _wanted(plan: ProgramPlan) -> list[str]:
-    """What the shading asks of a surface, in a fixed order."""
-    wanted = ["position"] * plan.positions + ["normal"] * plan.directed + ["tangent"] * plan.tangents
-    return wanted + ["uv"] * plan.mapped + ["colour"] * plan.coloured
+    """The names of the surface quantities that the shading uses, in the order of TYPES."""
+    asked = {
+        "position": plan.positions,
+        "normal": plan.oriented,
+        "tangent": plan.tangents,
+        "uv": plan.mapped,
+        "colour": plan.coloured,
+    }
+    return [name for name, is_asked in asked.items() if is_asked]
 
 
-def _varyings(plan: ProgramPlan, direction: str) -> str:
-    return "".join(f"{_varying(name, direction)}\n" for name in _handed_on(plan))
+def _wanted_by_alpha(plan: ProgramPlan) -> list[str]:
+    """The names of the surface quantities that the opacity depends on."""
+    asked = {"uv": plan.alpha_from is not None, "colour": plan.vertex_colours and plan.alpha != "opaque"}
+    return [name for name, is_asked in asked.items() if is_asked]
 
 
 def _handed_on(plan: ProgramPlan) -> list[str]:
-    """What passes from the vertex to the fragment stage under phong: what the shading wants, and what alpha does."""
+    """The names of the quantities that per-pixel shading passes from the vertex to the fragment stage."""
     names = _wanted(plan)
     return names + [name for name in _wanted_by_alpha(plan) if name not in names]
 
 
-def _wanted_by_alpha(plan: ProgramPlan) -> list[str]:
-    return ["uv"] * bool(plan.alpha_from) + ["colour"] * (plan.vertex_colours and plan.alpha != "opaque")
+def _varyings(names: list[str], direction: str) -> Code:
+    """The declarations of quantities that pass from the vertex to the fragment stage; direction is "in" or "out".
+
+    They are interpolated at the centroid of the covered samples. With several samples per pixel, the centre of a pixel at a
+    silhouette may lie outside the triangle, and attributes extrapolated to it give negative light or stray highlights.
+    Texture coordinates are interpolated at the pixel's centre: extrapolation does them no harm, but a shifted position would
+    change the level of detail, which the driver takes from their differences between pixels.
+    """
+    code = Code()
+    for name in names:
+        declare = code.input if direction == "in" else code.output
+        declare(TYPES[name], f"v_{name}", "" if name == "uv" else "centroid")
+    return code
 
 
-def _varying(name: str, direction: str) -> str:
-    """centroid: with several samples a pixel, the middle of one at the rim may lie outside the triangle, where an attribute
-    is extrapolated: negative light, stray highlights. Texture coordinates bear that, but not being moved: the level of detail
-    is taken from their differences between pixels."""
-    return f"{'' if name == 'uv' else 'centroid '}{direction} {TYPES[name]} v_{name};"
-
-
-def _transforms(plan: ProgramPlan) -> str:
-    text = ""
-    if plan.directed:
-        text += '#include "lib/normal_transform.glsl"\n'
+def _transforms(plan: ProgramPlan) -> Code:
+    code = Code()
+    if plan.oriented:
+        code.include("surface/normal_transform.glsl")
     if plan.tangents:
-        text += '#include "lib/tangent_transform.glsl"\n'
-    return text
+        code.include("surface/tangent_transform.glsl")
+    return code
 
 
-def _interpolated(plan: ProgramPlan) -> str:
-    """The vertex stage under phong: hands on what the fragment stage asks for."""
+def _interpolated(plan: ProgramPlan) -> Code:
+    """`void interpolate()` of the vertex stage for per-pixel shading, which sets the outputs that the fragment stage reads."""
     names = _handed_on(plan)
     values = {
         "position": "world(a_position)",
@@ -198,73 +195,88 @@ def _interpolated(plan: ProgramPlan) -> str:
         "uv": "a_uv",
         "colour": "a_colour",
     }
-    lines = [f"in {TYPES[name]} a_{name};" for name in names if name != "position"]
-    body = [f"    v_{name} = {values[name]};" for name in names]
-    text = "\n".join(lines) + "\n" + _transforms(plan) + _varyings(plan, "out")
-    return text + "\nvoid interpolate() {\n" + "\n".join(body) + "\n}\n"
+    code = Code()
+    for name in names:
+        if name != "position":
+            code.input(TYPES[name], f"a_{name}")
+    code.join(_transforms(plan)).join(_varyings(names, "out"))
+    body = "".join(f"    v_{name} = {values[name]};\n" for name in names)
+    return code.add(f"\nvoid interpolate() {{\n{body}}}\n")
 
 
-def _material(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
+def _material(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
+    """`STRUCT material()`, which returns the model's parameters at the surface."""
     model, struct = BRDFS[plan.brdf], BRDFS.class_name(plan.brdf)
-    declared = model.parameters()
-    text, body = f'#include "brdf/{plan.brdf}.glsl"\n', []
+    code, body = Code().include(f"brdf/{plan.brdf}.glsl"), []
     bound: set[str] = set()
     for name, use in plan.parameters:
-        colour = model.is_colour(name)
-        kind, channels = ("vec3", "rgb") if colour else ("float", "r")
-        value = f"u_{name}"
+        kind = "vec3" if model.is_colour(name) else "float"
         if use == "unused":
             body.append(f"    m.{name} = {kind}(0.0);")
-            continue
-        if use in declared:
+        elif use in model.parameters():
             body.append(f"    m.{name} = m.{use};")
-            continue
-        text += f"uniform {'float' if use == 'grey' else kind} u_{name};\n"
-        if use == "grey":
-            value = f"vec3({value})"
-        which = channel(use)
-        if which is not None:
-            picture = plan.picture_of(name)
-            if picture not in bound:
-                bound.add(picture)
-                text += f"uniform sampler2D u_{picture}_texture;\n"
-            value = _bounded(f"{value} * texture(u_{picture}_texture, {at.uv}).{which or channels}", declared[name])
-        if declared[name].base and plan.vertex_colours:
-            value += f" * {at.colour}.rgb"
-        body.append(f"    m.{name} = {value};")
-    return text + f"\n{struct} material() {{\n    {struct} m;\n" + "\n".join(body) + "\n    return m;\n}\n"
+        else:
+            body.append(f"    m.{name} = {_parameter(plan, name, use, at, bound, code)};")
+    lines = "\n".join(body)
+    return code.add(f"\n{struct} material() {{\n    {struct} m;\n{lines}\n    return m;\n}}\n")
+
+
+def _parameter(plan: ProgramPlan, name: str, use: str, at: _Interpolated | _AtVertex, bound: set[str], code: Code) -> str:
+    """The expression of a parameter that has a uniform or a texture.
+
+    plan: the plan of the program.
+    name: the parameter.
+    use: how the plan uses it.
+    at: the expressions of the surface's quantities.
+    bound: the parameters whose samplers are declared so far; this function adds to them.
+    code: the code that this function adds uniforms to.
+    """
+    model = BRDFS[plan.brdf]
+    declared, colour = model.parameters()[name], model.is_colour(name)
+    code.uniform("float" if use == "grey" or not colour else "vec3", f"u_{name}")
+    value = f"vec3(u_{name})" if use == "grey" else f"u_{name}"
+    texture_channel = channel(use)
+    if texture_channel is not None:
+        picture = plan.picture_of(name)
+        if picture not in bound:
+            bound.add(picture)
+            code.uniform("sampler2D", f"u_{picture}_texture")
+        channels = texture_channel or ("rgb" if colour else "r")
+        value = _bounded(f"{value} * texture(u_{picture}_texture, {at.uv}).{channels}", declared)
+    if declared.base and plan.vertex_colours:
+        value += f" * {at.colour}.rgb"
+    return value
 
 
 def _bounded(value: str, declared: Parameter) -> str:
-    """A texel beyond what a parameter may be counts as the nearest that it may."""
+    """An expression clamped to a parameter's bounds, which a texture may exceed."""
     low = repr(float(declared.low))
     return f"max({value}, {low})" if declared.high is None else f"clamp({value}, {low}, {float(declared.high)!r})"
 
 
 def bound_for_shading(plan: ProgramPlan, name: str) -> bool:
-    """Whether the shading already has a sampler of this parameter's name."""
+    """Whether the shading already declares the sampler named after this parameter."""
     return name in {plan.picture_of(textured) for textured in plan.textured}
 
 
-def _frame(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
-    text = '#include "lib/frame.glsl"\n#include "lib/unit.glsl"\n'
+def _frame(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
+    """`Frame frame(float side)`, which returns the shading frame; side -1 reverses the normal."""
+    code = Code().include("surface/frame.glsl", "math/unit.glsl")
     if plan.normal_map:
-        text += '#include "lib/normal_map.glsl"\nuniform sampler2D u_normal_map;\nuniform float u_normal_scale;\n'
+        code.include("surface/normal_map.glsl").uniform("sampler2D", "u_normal_map").uniform("float", "u_normal_scale")
     elif plan.tangents:
-        text += '#include "lib/tangent_frame.glsl"\n'
+        code.include("surface/tangent_frame.glsl")
     if plan.turned or plan.direction_map:
-        text += '#include "lib/turned_frame.glsl"\n'
+        code.include("surface/turned_frame.glsl")
     if plan.direction_map:
-        text += '#include "lib/direction_map.glsl"\nuniform sampler2D u_direction_map;\n'
+        code.include("surface/direction_map.glsl").uniform("sampler2D", "u_direction_map")
     if plan.turned:
-        text += "uniform vec2 u_turn;\n"
-    text += "\n// side: -1 turns the normal over.\nFrame frame(float side) {\n"
+        code.uniform("vec2", "u_turn")
     if plan.normal_map:
         u, v = plan.normal_span
-        # A division by two is exact, and so is the level of detail.
+        # The span is 1 or 2, and division by 2 is exact, so the texture coordinates keep all their digits.
         uv = at.uv if (u, v) == (1, 1) else f"{at.uv} / vec2({u}.0, {v}.0)"
-        sample = f"texture(u_normal_map, {uv}).xyz"
-        frame = f"mapped_frame({at.normal}, {at.tangent}, side, {sample}, u_normal_scale)"
+        frame = f"mapped_frame({at.normal}, {at.tangent}, side, texture(u_normal_map, {uv}).xyz, u_normal_scale)"
     elif plan.tangents:
         frame = f"tangent_frame({at.normal}, {at.tangent}, side)"
     else:
@@ -274,25 +286,29 @@ def _frame(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
         frame = f"turned_frame({frame}, mapped_direction(texture(u_direction_map, {at.uv}).rg))"
     if plan.turned:
         frame = f"turned_frame({frame}, u_turn)"
-    return text + f"    return {frame};\n}}\n"
+    return code.add(f"\n// A side of -1 reverses the normal.\nFrame frame(float side) {{\n    return {frame};\n}}\n")
 
 
-def _declared_lights(group: LightGroup) -> str:
-    """The uniforms of a group. Counted lights have one for each field, so that what nobody reads is not there."""
+def _lights(group: LightGroup) -> Code:
+    """The file of a group's type, and the group's uniforms.
+
+    A group with an exact count has one uniform for each field of the lights' struct. A field that no code reads is left out.
+    """
     struct = LIGHTS.class_name(group.type)
+    code = Code().include(f"light/{group.type}.glsl")
+    if group.falloff != "none":
+        code.include(f"falloff/{FALLOFFS[group.falloff].name}.glsl")
     if not group.count:
-        page = f"layout(std140) uniform {group.key}_page {{\n    {struct} u_{group.key}[{PAGE}];\n}};\n"
-        return page + f"uniform int u_{group.key}_count;\n"
-    array = "" if group.count == 1 else f"[{group.count}]"
-    return "".join(
-        f"uniform {'float' if name == 'intensity' and group.white else kind} u_{group.key}_{name}{array};\n"
-        for name, kind in LIGHTS[group.type].fields().items()
-        if name != "r_min" or group.falloff != "none"
-    )
+        return code.block(f"{group.key}_page", f"    {struct} u_{group.key}[{PAGE}];\n").uniform("int", f"u_{group.key}_count")
+    for name, kind in LIGHTS[group.type].fields().items():
+        if name != "r_min" or group.falloff != "none":
+            is_one_number = name == "intensity" and group.white
+            code.uniform("float" if is_one_number else kind, f"u_{group.key}_{name}", group.count if group.count > 1 else 0)
+    return code
 
 
 def _light(group: LightGroup) -> str:
-    """The expression of one light's struct."""
+    """The expression of the struct of the light at index i of a group."""
     if not group.count:
         return f"u_{group.key}[i]"
     index = "" if group.count == 1 else "[i]"
@@ -306,98 +322,104 @@ def _light(group: LightGroup) -> str:
 
 
 def _loop(group: LightGroup) -> str:
-    """c += what the lights of a group add."""
-    struct = LIGHTS.class_name(group.type)
-    inner = [f"{struct} light = {_light(group)};", "vec3 l;", "vec3 e = illuminate(light, p, l);"]
-    if group.falloff != "none":
-        inner.append(f"e *= falloff_{FALLOFFS[group.falloff]}(light.position - p, light.r_min);")
-    inner.append("c += e * brdf_cos(m, f, l, v);")
+    """The lines that add the light of a group to the colour `c`."""
+    inner = [f"{LIGHTS.class_name(group.type)} light = {_light(group)};"]
+    if group.omnidirectional:
+        inner.append("c += illuminate(light, f.n) * ambient_reflectance(m);")
+    else:
+        inner += ["vec3 l;", "vec3 e = illuminate(light, p, l);"]
+        if group.falloff != "none":
+            inner.append(f"e *= falloff_{FALLOFFS[group.falloff].name}(light.position - p, light.r_min);")
+        inner.append("c += e * brdf_cos(m, f, l, v);")
     body = "".join(f"        {line}\n" for line in inner)
     head = "" if group.count == 1 else f"for (int i = 0; i < {group.count or f'u_{group.key}_count'}; ++i) "
     return f"    {head}{{\n{body}    }}\n"
 
 
-# falloff -> its file under falloff/, and the end of its function's name.
-FALLOFFS = {"1/r": "inverse", "1/r^2": "inverse_square"}
-
-
-def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
-    """Everything up to `vec3 radiance(float side)`: what the surface shows to the viewer, linear."""
-    text = at.declarations
+def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
+    """`vec3 radiance(float side)` and everything that it calls: the linear light from the surface toward the viewer."""
+    code = at.declarations
     if plan.shows != "light":
-        return text + _shown(plan, at)
-    struct = BRDFS.class_name(plan.brdf)
-    ambient, shine = "vec3(0.0)", ""
+        return code.join(_shown(plan, at))
+    ambient, body = "vec3(0.0)", ""
     if plan.ambient == "constant":
-        text += "uniform vec3 u_ambient_radiance;\n"
+        code.uniform("vec3", "u_ambient_radiance")
         ambient = "u_ambient_radiance"
-    if plan.ambient == "varying":
-        text += '#include "light/ambient.glsl"\nuniform vec3 u_ambient_intensity;\n'
-        ambient = "illuminate(AmbientLight(u_ambient_intensity)) * ambient_reflectance(m)"
-    if plan.directed or plan.ambient == "varying":
-        text += _material(plan, at)
-        shine = f"    {struct} m = material();\n"
-    if not plan.directed:
-        # Where nothing shines at all, the surface is black, and keeps its place in the picture.
-        return text + f"\nvec3 radiance(float side) {{\n{shine}    return {ambient};\n}}\n"
-    text += _frame(plan, at) + f'#include "viewer/{plan.viewer}.glsl"\n#include "lib/horizon.glsl"\n'
+    elif plan.ambient == "varying":
+        code.include("light/ambient.glsl").uniform("vec3", "u_ambient_intensity")
+        # This light is the same for every normal.
+        ambient = "illuminate(AmbientLight(u_ambient_intensity), vec3(0.0)) * ambient_reflectance(m)"
+    if plan.lights or plan.ambient == "varying":
+        code.join(_material(plan, at))
+        body = f"    {BRDFS.class_name(plan.brdf)} m = material();\n"
+    if not plan.lights:
+        # Without any light the surface is drawn black: it still covers what lies behind it.
+        return code.add(f"\nvec3 radiance(float side) {{\n{body}    return {ambient};\n}}\n")
+    code.join(_frame(plan, at))
+    body += "    Frame f = frame(side);\n"
+    if plan.directed:
+        position = at.position if plan.positions else "vec3(0.0)"
+        code.include(f"viewer/{plan.viewer}.glsl", "surface/horizon.glsl")
+        body += f"    vec3 p = {position};\n    vec3 v = above_horizon(viewer(p), f.n);\n"
     for group in plan.lights:
-        text += f'#include "light/{group.type}.glsl"\n'
-        if group.falloff != "none":
-            text += f'#include "falloff/{FALLOFFS[group.falloff]}.glsl"\n'
-        text += _declared_lights(group)
+        code.join(_lights(group))
+    body += f"    vec3 c = {ambient};\n" + "".join(map(_loop, plan.lights))
+    return code.add(f"\nvec3 radiance(float side) {{\n{body}    return c;\n}}\n").join(_faces_viewer(plan, at))
+
+
+def _faces_viewer(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
+    """`bool faces_viewer()`, which a flat face that is drawn from both sides needs; no code for other programs."""
+    if not plan.sided:
+        return Code()
     position = at.position if plan.positions else "vec3(0.0)"
-    text += f"\nvec3 radiance(float side) {{\n{shine}    Frame f = frame(side);\n"
-    text += f"    vec3 p = {position};\n    vec3 v = above_horizon(viewer(p), f.n);\n    vec3 c = {ambient};\n"
-    text += "".join(map(_loop, plan.lights)) + "    return c;\n}\n"
-    return text + _faces_viewer(plan, at)
+    code = Code().include(f"viewer/{plan.viewer}.glsl")
+    return code.add(f"\nbool faces_viewer() {{\n    return dot({at.normal}, viewer({position})) >= 0.0;\n}}\n")
 
 
-def _faces_viewer(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
-    """`bool faces_viewer()`, which a face asks that is seen from both sides."""
-    if plan.rate != "flat" or not plan.both_sides:
-        return ""
-    position = at.position if plan.positions else "vec3(0.0)"
-    return f"\nbool faces_viewer() {{\n    return dot({at.normal}, viewer({position})) >= 0.0;\n}}\n"
-
-
-def _shown(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> str:
-    """`vec3 radiance(float side)` of what is shown in place of light."""
-    text = ""
+def _shown(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
+    """`vec3 radiance(float side)` for a program that shows a normal, uv or depth in place of light."""
+    code = Code()
     if plan.shows == "normal":
-        text = _frame(plan, at) + f'#include "viewer/{plan.viewer}.glsl"\n' * (plan.rate == "flat" and plan.both_sides)
-        value = "frame(side).n"
+        code, value = _frame(plan, at), "frame(side).n"
     elif plan.shows == "uv":
         value = f"vec3({at.uv}, 0.0)"
     else:
-        text, value = "uniform vec3 u_viewer;\nuniform float u_number;\n", f"vec3(-dot(u_viewer, {at.position}), u_number, 0.0)"
-    return text + f"\nvec3 radiance(float side) {{\n    return {value};\n}}\n" + _faces_viewer(plan, at)
+        code.uniform("vec3", "u_viewer").uniform("float", "u_number")
+        value = f"vec3(-dot(u_viewer, {at.position}), u_number, 0.0)"
+    return code.add(f"\nvec3 radiance(float side) {{\n    return {value};\n}}\n").join(_faces_viewer(plan, at))
 
 
-def _alpha_inputs(plan: ProgramPlan, direction: str) -> str:
-    """What the fragment stage of a per-vertex or per-face program asks of the vertex stage beside its colour."""
+def _alpha_inputs(plan: ProgramPlan, direction: str) -> Code:
+    """The quantities that alpha needs in a per-vertex or per-face program.
+
+    direction: "in" for the inputs of the fragment stage, "out" for the outputs of the vertex stage and `void interpolate()`,
+    which sets them.
+    """
     names = _wanted_by_alpha(plan)
-    text = "".join(f"{_varying(name, direction)}\n" for name in names)
     if direction == "in":
-        return text
+        return _varyings(names, "in")
+    code = Code()
     declared = () if plan.rate == "flat" else _wanted(plan)
-    attributes = "".join(f"in {TYPES[name]} a_{name};\n" for name in names if name not in declared)
+    for name in names:
+        if name not in declared:
+            code.input(TYPES[name], f"a_{name}")
+    code.join(_varyings(names, "out"))
     body = "".join(f"    v_{name} = a_{name};\n" for name in names)
-    return attributes + text + f"\nvoid interpolate() {{\n{body}}}\n"
+    return code.add(f"\nvoid interpolate() {{\n{body}}}\n")
 
 
-def _alpha(plan: ProgramPlan) -> str:
-    """`float alpha()`: opacity; a cut-out discards."""
+def _alpha(plan: ProgramPlan) -> Code:
+    """`float alpha()`, which returns the opacity. With alpha mode "mask" it discards fragments below the cutoff."""
     if plan.alpha == "opaque":
-        return "\nfloat alpha() {\n    return 1.0;\n}\n"
-    text, value = "uniform float u_alpha;\n", "u_alpha"
+        return Code().add("\nfloat alpha() {\n    return 1.0;\n}\n")
+    code, value = Code().uniform("float", "u_alpha"), "u_alpha"
     if plan.alpha_from:
         if plan.rate != "phong" or not bound_for_shading(plan, plan.alpha_from):
-            text += f"uniform sampler2D u_{plan.alpha_from}_texture;\n"
+            code.uniform("sampler2D", f"u_{plan.alpha_from}_texture")
         value += f" * texture(u_{plan.alpha_from}_texture, v_uv).a"
     if plan.vertex_colours:
         value += " * v_colour.a"
     if plan.alpha == "blend":
-        return text + f"\nfloat alpha() {{\n    return {value};\n}}\n"
-    text += "uniform float u_alpha_cutoff;\n"
-    return text + f"\nfloat alpha() {{\n    if ({value} < u_alpha_cutoff)\n        discard;\n    return 1.0;\n}}\n"
+        return code.add(f"\nfloat alpha() {{\n    return {value};\n}}\n")
+    code.uniform("float", "u_alpha_cutoff")
+    return code.add(f"\nfloat alpha() {{\n    if ({value} < u_alpha_cutoff)\n        discard;\n    return 1.0;\n}}\n")

@@ -1,7 +1,7 @@
-"""Uniforms: the float32 values that a program is given, by GLSL name.
+"""Uniforms: the float32 values of a program's uniforms, by GLSL name.
 
-Everything is computed in float64 and rounded once, here. The reference renderer starts from the same rounded values, so
-that the two renderers share their inputs and nothing else.
+All values are computed in float64 and rounded once, in this module. The reference renderer starts from the same rounded
+values, so that the two renderers share their inputs and nothing else.
 """
 
 from __future__ import annotations
@@ -11,39 +11,45 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.arrays import _precision, rounded
-from glshade.assembly.assembly import Assembly, Instance
+from glshade.arrays import precision, rounded
+from glshade.assembly.assembly import Assembly
+from glshade.assembly.instance import Instance
 from glshade.assembly.values import ambient_intensity, ambient_reflectance, direction, light_values, normal_matrix
 from glshade.brdfs import Brdf
 from glshade.brdfs import parameter_values as parameter_values
 from glshade.glsl.plan import LightGroup, ProgramPlan, channel
 from glshade.lights import LIGHTS, Light
-from glshade.textures.texels import Texels, texels
+from glshade.textures.texels import Texels, texels_of
 
 Array = NDArray[np.float64]
 Values = dict[str, NDArray[np.float32]]
 
 
 def object_uniforms(plan: ProgramPlan, instance: Instance, eye: Array) -> Values:
-    """What differs from object to object: its place relative to the eye, and its material."""
+    """The uniforms that differ from object to object: the placement and the material.
+
+    plan: the plan of the program.
+    instance: the object.
+    eye: the position (3,) of the viewer in the world; the placement is relative to it.
+    """
     world = instance.world_from_object
     relative = world.copy()
     relative[:3, 3] -= eye
     values: dict[str, Any] = {"u_world_from_object": relative}
-    if plan.directed:
+    if plan.oriented:
         values["u_normal_from_object"] = normal_matrix(world[:3, :3])
     if plan.tangents:
         values["u_handedness"] = -1.0 if instance.mirrored else 1.0
     if plan.shows == "depth":
         values["u_number"] = instance.number
     values.update(material_uniforms(plan, instance.material))
-    precision = _precision.get()
-    with np.errstate(over="ignore"):  # once for all of an object's numbers
-        return {name: np.asarray(value, dtype=np.float64).astype(precision) for name, value in values.items()}
+    dtype = precision()
+    with np.errstate(over="ignore"):  # Values beyond float32 become infinite; the caller reports them.
+        return {name: np.asarray(value, dtype=np.float64).astype(dtype) for name, value in values.items()}
 
 
 def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
-    """The parameters that the program asks for; a texture's is its factor."""
+    """The uniforms of the material's parameters that the program reads. A textured parameter gives the factor of its texels."""
     values: dict[str, Any] = {}
     for name, use in plan.parameters:
         value = getattr(material, name)
@@ -52,7 +58,7 @@ def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
         elif use in ("uniform", "grey"):
             values[f"u_{name}"] = value if use == "uniform" else value[0]
     if plan.normal_map:
-        # The normals of heights are those of a surface of height 1.
+        # The normal map of a bump map is computed for heights in [0, 1], so the height scales it.
         values["u_normal_scale"] = material.bump_map.height if material.bump_map else material.normal_map.scale
     if plan.turned:
         values["u_turn"] = direction(material)
@@ -64,25 +70,31 @@ def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
 
 
 def textures(plan: ProgramPlan, material: Brdf) -> dict[str, Texels]:
-    """sampler name -> what it samples."""
-    found = {f"u_{plan.picture_of(name)}_texture": texels(material, name) for name in plan.textured}
+    """Sampler name -> texels, for every texture that the program reads."""
+    texels = {f"u_{plan.picture_of(name)}_texture": texels_of(material, name) for name in plan.textured}
     if plan.alpha_from:
-        found[f"u_{plan.alpha_from}_texture"] = texels(material, plan.alpha_from)
+        texels[f"u_{plan.alpha_from}_texture"] = texels_of(material, plan.alpha_from)
     if plan.normal_map:
-        found["u_normal_map"] = texels(material, "bump_map" if material.bump_map else "normal_map")
+        texels["u_normal_map"] = texels_of(material, "bump_map" if material.bump_map else "normal_map")
     if plan.direction_map:
-        found["u_direction_map"] = texels(material, "tangent_direction")
-    return found
+        texels["u_direction_map"] = texels_of(material, "tangent_direction")
+    return texels
 
 
 def ambient_radiance(instance: Instance, assembly: Assembly, exposure: float) -> Values:
-    """What ambient light adds to a surface of one colour."""
+    """The uniform with the ambient light (3,) that a surface reflects, if its ambient reflectance is constant."""
     intensity = ambient_intensity(assembly, instance.lights, exposure)
     return {"u_ambient_radiance": rounded(ambient_reflectance(instance.material) * intensity)}
 
 
 def light_uniforms(plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...], exposure: float) -> Values:
-    """The lights that are plain uniforms: ambient, and the groups that are counted exactly."""
+    """The uniforms of ambient light and of the groups of lights that have an exact count.
+
+    plan: the plan of the program.
+    assembly: the assembled scene.
+    chosen: the indices of the lights that reach the object.
+    exposure: the film's exposure [stops].
+    """
     values: Values = {}
     if plan.ambient == "varying":
         values["u_ambient_intensity"] = rounded(ambient_intensity(assembly, chosen, exposure))
@@ -99,7 +111,7 @@ def light_uniforms(plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...
 
 
 def std140(type_name: str) -> np.dtype[np.void]:
-    """The layout of a light's struct in a uniform block: vec3 on 16 bytes, float on 4, the whole rounded up to 16."""
+    """The std140 layout of a light's struct: a vec3 is aligned to 16 bytes, a float to 4; the size is a multiple of 16."""
     names, formats, offsets, offset = [], [], [], 0
     for name, kind in LIGHTS[type_name].fields().items():
         vector = kind == "vec3"
@@ -112,7 +124,14 @@ def std140(type_name: str) -> np.dtype[np.void]:
 
 
 def light_pages(group: LightGroup, lights: list[Light], eye: Array, exposure: float, page: int) -> list[NDArray[np.void]]:
-    """The lights of a large group as std140 records, at most `page` a piece."""
+    """The lights of a large group as arrays of std140 records, one array per page.
+
+    group: a group of lights without an exact count.
+    lights: the lights of the group.
+    eye: the position (3,) of the viewer in the world.
+    exposure: the film's exposure [stops].
+    page: the largest number of lights per page.
+    """
     layout = std140(group.type)
     records = np.zeros(len(lights), dtype=layout)
     for index, light in enumerate(lights):

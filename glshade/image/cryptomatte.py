@@ -1,7 +1,8 @@
-"""Cryptomatte: masks by name, anti-aliased, in layers of ordinary pictures (Psyop's specification 1.2).
+"""Cryptomatte: anti-aliased masks of named objects, stored in float layers (Psyop's specification 1.2).
 
-A pixel has pairs of an id and the share of the pixel that it covers, the largest share first: two pairs a layer. An id is the
-hash of a name, its bits taken for a float's.
+Each pixel holds pairs (id, share), sorted by share with the largest first: the id stands for a name, the share is the part of
+the pixel that the named object covers, from 0 to 1. A layer has four channels and so holds two pairs. An id is the hash of a
+name, and the hash's 32 bits are stored as the bits of a float.
 """
 
 from __future__ import annotations
@@ -12,13 +13,14 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-# Three layers of two pairs each: what the specification suggests.
+# The number of layers that the specification suggests.
 LAYERS = 3
+# The names under which the files list the masks of objects and of materials.
 OBJECT, MATERIAL = "CryptoObject", "CryptoMaterial"
 
 
 def murmur3_32(data: bytes) -> int:
-    """MurmurHash3_x86_32 (Appleby, public domain) with seed 0."""
+    """Returns the hash MurmurHash3_x86_32 (Appleby, public domain) with seed 0, from 0 to 2^32 - 1."""
 
     def scrambled(k: int) -> int:
         k = k * 0xCC9E2D51 & 0xFFFFFFFF
@@ -38,18 +40,24 @@ def murmur3_32(data: bytes) -> int:
 
 
 def id_bits(name: str) -> int:
-    """The name's id, as the bits of a float. No NaN, no infinity and no denormal: their exponents lose their lowest bit."""
+    """Returns the id of a name, as the 32 bits of a normal float."""
     bits = murmur3_32(name.encode())
+    # An exponent of 0 or 255 makes a denormal, an infinity or a NaN, which programs may change. The specification flips the
+    # exponent's lowest bit, bit 23, to avoid them.
     return bits ^ 1 << 23 if bits >> 23 & 255 in (0, 255) else bits
 
 
 def id_floats(names: Sequence[str]) -> NDArray[np.float32]:
-    """(N,): the names' ids."""
+    """Returns (N,): the ids of N names, as floats."""
     return np.array([id_bits(name) for name in names], dtype=np.uint32).view(np.float32)
 
 
 def metadata(layer: str, names: Iterable[str]) -> dict[str, str]:
-    """What the file has to say of a layer and of the names in it."""
+    """Returns the attributes by which a file declares a set of masks.
+
+    layer: the name of the set, OBJECT or MATERIAL.
+    names: the names of its objects or materials, which the manifest lists with their ids.
+    """
     prefix = f"cryptomatte/{id_bits(layer):08x}"[:-1]
     manifest = {name: f"{id_bits(name):08x}" for name in names}
     return {
@@ -61,33 +69,42 @@ def metadata(layer: str, names: Iterable[str]) -> dict[str, str]:
 
 
 def ranked(samples: Sequence[NDArray[np.integer]], names: Sequence[str]) -> NDArray[np.float32]:
-    """(H, W, 4 LAYERS): ids and shares, the largest first. samples (H, W): at each of a pixel's points, the place among `names`
-    of what is there, -1 for nothing. What ranks beyond the layers is left out."""
-    first = samples[0]
-    ids = id_floats(names)
+    """Returns (H, W, 4 LAYERS): the pairs (id, share) of each pixel, the largest share first; unused pairs are 0.
+
+    Where more names share a pixel than there are pairs, the smallest shares are left out.
+    samples: one array (H, W) for each sample position in a pixel, at least one array. It holds indices into `names`, and -1 for
+        the background.
+    """
+    first, ids = samples[0], id_floats(names)
     result = np.zeros((*first.shape, 4 * LAYERS), dtype=np.float32)
-    there = first >= 0
-    result[there, 0], result[there, 1] = ids[first[there]], 1.0
-    mixed = (
-        np.flatnonzero(np.any([sample != first for sample in samples[1:]], axis=0)) if len(samples) > 1 else np.empty(0, int)
-    )
-    if not len(mixed):
-        return result
-    # Runs of equal places, pixel after pixel.
-    count = len(samples)
-    places = np.sort(np.stack([sample.reshape(-1)[mixed] for sample in samples], axis=1), axis=1).reshape(-1)
-    change = np.flatnonzero((places[1:] != places[:-1]) | (np.arange(1, len(places)) % count == 0)) + 1
-    start = np.concatenate([[0], change])
-    length = np.diff(np.append(start, len(places)))
-    seen = places[start] >= 0
-    pixel, place, length = start[seen] // count, places[start][seen], length[seen]
-    order = np.lexsort((place, -length, pixel))
-    pixel, place, length = pixel[order], place[order], length[order]
-    new = np.flatnonzero(np.append(True, pixel[1:] != pixel[:-1])) if len(pixel) else np.empty(0, int)
-    rank = np.arange(len(pixel)) - np.repeat(new, np.diff(np.append(new, len(pixel))))
-    kept = rank < 2 * LAYERS
-    pairs = np.zeros((len(mixed), 4 * LAYERS), dtype=np.float32)
-    pairs[pixel[kept], 2 * rank[kept]] = ids[place[kept]]
-    pairs[pixel[kept], 2 * rank[kept] + 1] = length[kept] / count
-    result.reshape(-1, 4 * LAYERS)[mixed] = pairs
+    named = first >= 0
+    result[named, 0], result[named, 1] = ids[first[named]], 1.0
+    # Most pixels show one name alone and are finished here. Only the pixels whose samples differ need to be counted.
+    mixed = np.flatnonzero(np.any([sample != first for sample in samples[1:]], axis=0))
+    if len(mixed):
+        indices = np.stack([sample.reshape(-1)[mixed] for sample in samples], axis=1)
+        result.reshape(-1, 4 * LAYERS)[mixed] = _pairs(indices, ids)
     return result
+
+
+def _pairs(indices: NDArray[np.integer], ids: NDArray[np.float32]) -> NDArray[np.float32]:
+    """Returns (N, 4 LAYERS): the pairs of N pixels.
+
+    indices: (N, S), an index into `ids` for each of S samples in a pixel, -1 for the background.
+    """
+    pixels, samples = indices.shape
+    # After sorting, equal indices of a pixel form a run, whose length is the number of samples that show the name.
+    flat = np.sort(indices, axis=1).reshape(-1)
+    start = np.flatnonzero(np.append(True, (flat[1:] != flat[:-1]) | (np.arange(1, len(flat)) % samples == 0)))
+    length = np.diff(np.append(start, len(flat)))
+    pixel, index = start // samples, flat[start]
+    order = np.lexsort((index, -length, pixel))
+    order = order[index[order] >= 0]
+    pixel, index, length = pixel[order], index[order], length[order]
+    # The rank of a run is its distance from the first run of its pixel.
+    rank = np.arange(len(pixel)) - np.searchsorted(pixel, pixel)
+    kept = rank < 2 * LAYERS
+    pairs = np.zeros((pixels, 4 * LAYERS), dtype=np.float32)
+    pairs[pixel[kept], 2 * rank[kept]] = ids[index[kept]]
+    pairs[pixel[kept], 2 * rank[kept] + 1] = length[kept] / samples
+    return pairs

@@ -1,4 +1,4 @@
-"""Image: an array with channels and a colour space."""
+"""Image: a picture in memory, an array with channels and a colour space."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.errors import GlshadeError
-from glshade.image.file import FLOAT_SUFFIXES, check_suffix, write
+from glshade.image.contents import PictureContents
+from glshade.image.file import format_of, write
 from glshade.image.srgb import linear_to_srgb, srgb_to_linear
 
 Encoding = Literal["linear", "srgb"]
@@ -20,12 +21,14 @@ Encoding = Literal["linear", "srgb"]
 
 @dataclass(frozen=True, eq=False)
 class Image:
-    """A picture, row 0 at the top.
+    """A picture.
 
-    pixels (H, W, 3 or 4): float32 and linear Rec. 709 with premultiplied alpha, or uint8 with straight alpha, encoded as
-    `encoding` says: linear, srgb, or what a view transform left, by its colour interop id ("unknown" without one).
-    attributes: what files say of themselves beside the pixels; HDR says nothing. corner, whole: of a crop, where it lies and
-    the size of the picture that it is of [pixels]; OpenEXR keeps both.
+    pixels: (H, W, 3 or 4), row 0 at the top; float32, linear Rec. 709 with premultiplied alpha, or uint8 with straight alpha.
+    encoding: the encoding of uint8 pixels: "linear" or "srgb". After a view transform it is the colour interop id of the
+        display's colour space, or "unknown" where that space has no id.
+    attributes: texts about the picture, by name, for files of formats that hold any.
+    corner: x, y of a crop's top left corner in the whole picture [pixels].
+    whole: width, height of the picture that a crop belongs to [pixels]; None where the picture is not cropped.
     """
 
     pixels: NDArray[Any]
@@ -36,18 +39,18 @@ class Image:
 
     @property
     def channels(self) -> str:
-        """RGB or RGBA."""
+        """The channels: RGB or RGBA."""
         return "RGBA"[: self.pixels.shape[2]]
 
     @property
     def colour_space(self) -> str:
-        """linear Rec. 709, sRGB-encoded, or display-encoded with its name."""
+        """The colour space in words: "linear Rec. 709", "sRGB-encoded", or "display-encoded" with the encoding's name."""
         named = {"linear": "linear Rec. 709", "srgb": "sRGB-encoded"}
         return named.get(self.encoding) or f"display-encoded ({self.encoding})"
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """(height, width, channels)."""
+        """Height, width and number of channels."""
         return self.pixels.shape
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
@@ -58,26 +61,31 @@ class Image:
         return f"<Image {width}x{height} {self.channels} {self.pixels.dtype}, {self.colour_space}>"
 
     def linear(self) -> Image:
-        """float32, linear Rec. 709, premultiplied. Errors: GlshadeError after a view transform for another display."""
+        """Returns this picture as float32, linear Rec. 709, premultiplied; a float picture is returned as it is.
+
+        Errors: GlshadeError for 8-bit pixels that a view transform made for a display other than sRGB.
+        """
         if self.pixels.dtype == np.float32:
             return self
         if self.encoding not in ("linear", "srgb"):
             raise GlshadeError(f"{self!r} does not become linear again: render with dtype='float32'")
         c = self.pixels.astype(np.float32) / 255
         rgb: NDArray[Any] = srgb_to_linear(c[..., :3]) if self.encoding == "srgb" else c[..., :3]
-        c = np.concatenate([rgb * c[..., 3:], c[..., 3:]], axis=2) if c.shape[2] == 4 else rgb
+        c = np.concatenate([rgb * c[..., 3:], c[..., 3:]], axis=2) if self.channels == "RGBA" else rgb
         return replace(self, pixels=c, encoding="linear")
 
     def encoded(self, encoding: Encoding = "srgb") -> Image:
-        """uint8, to the nearest code; straight alpha. An image that has 8 bits already stays as it is."""
+        """Returns this picture as uint8, rounded to the nearest code, with straight alpha; an 8-bit picture stays as it is."""
         if self.pixels.dtype == np.uint8:
             return self
         return self.through(linear_to_srgb if encoding == "srgb" else lambda rgb: rgb, encoding)
 
     def through(self, transform: Callable[[NDArray[np.float32]], NDArray[Any]], encoding: str) -> Image:
-        """uint8, to the nearest code, of a float image; straight alpha.
+        """Returns a float picture as uint8, rounded to the nearest code, with straight alpha.
 
-        transform: of colours (H, W, 3), before alpha multiplies them, to their numbers in `encoding`, clipped to 0 to 1.
+        transform: a function from linear colours (H, W, 3), not multiplied by alpha, to encoded ones, which are then clipped to
+            [0, 1].
+        encoding: the name of the encoding that `transform` gives.
         """
         rgb: NDArray[Any] = self.pixels[..., :3]
         if self.channels == "RGBA":
@@ -89,31 +97,30 @@ class Image:
         return replace(self, pixels=(np.clip(c, 0, 1) * 255 + 0.5).astype(np.uint8), encoding=encoding)
 
     def save(self, path: str | Path, attributes: Mapping[str, str] | None = None) -> None:
-        """Writes the picture; the extension says how.
+        """Writes the picture in the format that the extension names.
 
-        EXR, HDR: float32, linear. PNG, JPEG, TIFF: 8-bit, sRGB-encoded unless the image has 8 bits of another kind. JPEG has no
-        alpha. attributes: what the file says of itself, too.
-        The file appears whole or not at all. Errors: GlshadeError.
+        EXR and HDR hold linear float32 numbers. PNG, JPEG and TIFF hold 8-bit numbers: a float picture is encoded as sRGB, an
+        8-bit one is written as it is. JPEG and HDR have no alpha. The file is written whole or not at all.
+        attributes: optional texts about the picture, added to the image's own, by name.
+        Errors: GlshadeError.
         """
         path = Path(path)
-        check_suffix(path)
-        if path.suffix.lower() in FLOAT_SUFFIXES:
-            image = self.linear()
-            if self.pixels.dtype != np.float32:
-                warnings.warn(
-                    f"{path}: an 8-bit image is saved as float; render with dtype='float32' for all its digits",
-                    stacklevel=2,
-                )
-        else:
-            image = self.encoded()
-        write(
-            path,
+        floats = format_of(path).floats
+        image = self.linear() if floats else self.encoded()
+        if floats and image is not self:
+            warnings.warn(
+                f"{path}: an 8-bit image is saved as float; render with dtype='float32' for all its digits",
+                stacklevel=2,
+            )
+        contents = PictureContents(
             image.pixels,
-            encoding=image.encoding,
+            encoding="linear" if floats else image.encoding,
+            premultiplied=floats,
             attributes={**image.attributes, **(attributes or {})},
             corner=image.corner,
             whole=image.whole,
         )
+        write(path, contents)
 
     def _repr_png_(self) -> bytes:
         import tempfile

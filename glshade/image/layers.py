@@ -1,4 +1,4 @@
-"""Layers: a picture with what it is made of: lights and lobes that add up to it, and what is known of each pixel's surface."""
+"""Layers: a picture, the parts of it that its lights and lobes add, and data about the surface in each pixel."""
 
 from __future__ import annotations
 
@@ -14,24 +14,43 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from glshade.image.image import Image
 
-# What a film may ask for; docs/layers.md says what each is.
+# The layers that a film may ask for; docs/layers.md explains each.
 AOVS = (
-    *("depth", "normal", "view_normal", "position", "uv"),
-    *("albedo", "diffuse", "specular", "lights", "background"),
-    *("object_id", "material_id", "cryptomatte"),
+    "depth",
+    "normal",
+    "view_normal",
+    "position",
+    "uv",
+    "albedo",
+    "diffuse",
+    "specular",
+    "lights",
+    "background",
+    "object_id",
+    "material_id",
+    "cryptomatte",
 )
-# The names of a layer's channels, where they are not colours: Z, XYZ and UV are what compositing programs call depths, vectors
-# and texture coordinates, I is Mitsuba's for an index.
+# The channel letters of layers that are not colours. Compositing programs expect Z for a depth, XYZ for a vector and UV for
+# texture coordinates; I for an index is Mitsuba's.
 CHANNELS = {
-    **{"depth": "Z", "normal": "XYZ", "view_normal": "XYZ", "position": "XYZ", "uv": "UV"},
-    **{"object_id": "I", "material_id": "I"},
+    "depth": "Z",
+    "normal": "XYZ",
+    "view_normal": "XYZ",
+    "position": "XYZ",
+    "uv": "UV",
+    "object_id": "I",
+    "material_id": "I",
 }
 
 
 @dataclass(frozen=True, eq=False)
 class Layers:
-    """image: the picture. arrays: name -> (H, W, C) float32, row 0 at the top, linear and premultiplied where it is a colour.
-    attributes: what the layers' file says of them."""
+    """A picture and its layers, all of the same size.
+
+    image: the picture.
+    arrays: name -> (H, W, C) float32, row 0 at the top; colours are linear Rec. 709 and premultiplied.
+    attributes: texts about the layers, by name, for the file that holds them.
+    """
 
     image: Image
     arrays: dict[str, NDArray[np.float32]]
@@ -39,7 +58,7 @@ class Layers:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """The layers' channels, as an OpenEXR file names them: `normal.X`."""
+        """The names of the layers' channels as an OpenEXR file has them, such as `normal.X`."""
         return tuple(
             f"{name}.{channel}"
             for name, array in self.arrays.items()
@@ -47,37 +66,48 @@ class Layers:
         )
 
     def save(self, path: str | Path, attributes: Mapping[str, str] | None = None) -> None:
-        """Writes the picture with its layers.
+        """Writes the picture and its layers.
 
-        EXR: one file with all of them, the picture in R, G, B (and A). Other extensions: the picture as Image.save has it, and
-        its layers beside it in NAME.aovs.exr, which is written first: where there is a picture, its layers are complete.
-        attributes: what the picture's file says of itself, too. Errors: GlshadeError.
+        A format that holds layers (OpenEXR) gets one file, with the picture in the channels R, G, B (and A). In other formats
+        Image.save writes the picture, and the layers go to NAME.aovs.exr in the same folder.
+        attributes: optional texts about the picture, added to the image's own, by name.
+        Errors: GlshadeError.
         """
-        from glshade.image.file import check_suffix
+        from glshade.image.file import format_of
 
         path = Path(path)
-        check_suffix(path)
         picture = replace(self.image, attributes={**self.image.attributes, **(attributes or {})})
-        if path.suffix.lower() == ".exr" and self.arrays:
+        if format_of(path).layers and self.arrays:
             linear = picture.linear()
             self._write(path, (*linear.channels, *self.channels), [linear.pixels, *self.arrays.values()], picture)
             return
+        # The layers are written first, so that a picture's file implies that its layers are complete.
         if self.arrays:
-            self._write(beside(path), self.channels, list(self.arrays.values()), picture)
+            self._write(layers_path(path), self.channels, list(self.arrays.values()), picture)
         picture.save(path)
 
     def _write(self, path: Path, channels: tuple[str, ...], arrays: list[NDArray[np.float32]], picture: Image) -> None:
+        """Writes a file of named channels: those of the arrays (H, W, C) in turn. Texts and crop are those of `picture`."""
+        from glshade.image.contents import PictureContents
         from glshade.image.file import write
 
-        pixels, attributes = np.concatenate(arrays, axis=2), {**picture.attributes, **self.attributes}
-        write(path, pixels, channels=channels, attributes=attributes, corner=picture.corner, whole=picture.whole)
+        contents = PictureContents(
+            np.concatenate(arrays, axis=2),
+            encoding="linear",
+            premultiplied=True,
+            channels=channels,
+            attributes={**picture.attributes, **self.attributes},
+            corner=picture.corner,
+            whole=picture.whole,
+        )
+        write(path, contents)
 
 
-def beside(path: Path) -> Path:
-    """Where the layers of a picture lie that has no room for them."""
+def layers_path(path: Path) -> Path:
+    """Returns the file for the layers of a picture whose own file cannot hold them."""
     return path.with_name(f"{path.stem}.aovs.exr")
 
 
 def names_attribute(names: list[str]) -> str:
-    """A list of names as a file's attribute: JSON."""
+    """Returns a list of names as the text of a file's attribute, in JSON."""
     return json.dumps(names, separators=(",", ":"))

@@ -1,4 +1,4 @@
-"""Metrics: how far one picture is from another, in the ways that people ask for."""
+"""Metrics: numbers that say how far a picture is from the true one."""
 
 from __future__ import annotations
 
@@ -11,16 +11,24 @@ from numpy.typing import NDArray
 from glshade.image.srgb import linear_to_srgb
 
 Array = NDArray[Any]
-# Of a 0.7 m wide screen of 3840 pixels seen from 0.7 m: the default of FLIP's authors.
+# The default of FLIP's authors: a screen 0.7 m and 3840 pixels wide, seen from 0.7 m.
 PIXELS_PER_DEGREE = 67.0
 
 
 @dataclass(frozen=True)
 class Errors:
-    """Of one picture, or the largest of several.
+    """The errors of one picture, or the largest ones of several pictures.
 
-    max_abs: of linear light, at the pixel `at` (x, y). rmse, p999: of the pixels' largest channels. codes: share of 8-bit
-    sRGB codes that are others. flip: mean of FLIP (Andersson et al. 2020). non_finite: values, left out of all the others.
+    The error of a pixel is the largest absolute difference of its three colour channels, in linear light. A pixel with an
+    infinity or a NaN counts in `non_finite` alone.
+
+    max_abs: the largest error.
+    at: x, y of the pixel with the largest error.
+    rmse: root of the mean squared error.
+    p999: the error that 99.9 % of the pixels do not exceed, interpolated between pixels.
+    codes: share of the channels whose 8-bit sRGB code differs, from 0 to 1.
+    flip: the mean of FLIP over all pixels, from 0 to 1 (Andersson et al. 2020).
+    non_finite: number of channel values that are infinite or NaN.
     """
 
     max_abs: float
@@ -32,47 +40,52 @@ class Errors:
     non_finite: int
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Returns the errors by name, ready for JSON."""
         return asdict(self)
 
 
-# What a budget may be set for.
+# The errors that a budget can limit.
 METRICS = ("max_abs", "rmse", "p999", "codes", "flip")
 
 
 def errors(picture: Array, truth: Array, where: NDArray[np.bool_] | None = None, flip: bool = True) -> Errors:
-    """picture, truth (H, W, 3 or 4): linear. where (H, W): the pixels that count. flip: left out it is 0."""
+    """Returns the errors of a picture.
+
+    picture, truth: (H, W, 3 or 4), linear Rec. 709; alpha is ignored.
+    where: optional (H, W); only pixels where it is True are measured, except that `non_finite` counts in all pixels.
+    flip: False skips FLIP, which is slow, and reports it as 0.
+    """
     finite: Array = np.logical_and.reduce(np.isfinite(picture), axis=2)
-    one = np.where(finite[..., None], picture, truth)[..., :3].astype(np.float64)
-    other = truth[..., :3]
-    counted = finite if where is None else finite & where
-    off = np.where(counted, np.abs(one - other).max(axis=2), 0.0)
-    y, x = np.unravel_index(int(np.argmax(off)), off.shape)
-    some = off[counted] if counted.any() else np.zeros(1)
-    codes = [np.rint(np.clip(linear_to_srgb(p), 0, 1) * 255) for p in (one, other)]
-    different = (codes[0] != codes[1])[counted]
+    colours = np.where(finite[..., None], picture, truth)[..., :3].astype(np.float64)
+    true_colours = truth[..., :3]
+    measured = finite if where is None else finite & where
+    error = np.where(measured, np.abs(colours - true_colours).max(axis=2), 0.0)
+    y, x = np.unravel_index(int(np.argmax(error)), error.shape)
+    measured_errors = error[measured] if measured.any() else np.zeros(1)
+    codes, true_codes = (np.rint(np.clip(linear_to_srgb(c), 0, 1) * 255) for c in (colours, true_colours))
+    different = (codes != true_codes)[measured]
     return Errors(
-        max_abs=float(off.max(initial=0.0)),
+        max_abs=float(error.max(initial=0.0)),
         at=(int(x), int(y)),
-        rmse=float(np.sqrt(np.mean(some**2))),
-        p999=float(np.quantile(some, 0.999)),
+        rmse=float(np.sqrt(np.mean(measured_errors**2))),
+        p999=float(np.quantile(measured_errors, 0.999)),
         codes=float(different.mean()) if different.size else 0.0,
-        flip=_flip(np.where(counted[..., None], one, other), other) if flip else 0.0,
+        flip=_flip(np.where(measured[..., None], colours, true_colours), true_colours) if flip else 0.0,
         non_finite=int((~np.isfinite(picture)).sum()),
     )
 
 
 def largest(several: list[Errors]) -> Errors:
-    """The largest of each, and the pixel of the largest max_abs."""
+    """Returns the largest value of each error, with the pixel of the largest max_abs."""
     worst = max(several, key=lambda e: e.max_abs)
     numbers = {name: max(getattr(e, name) for e in several) for name in (*METRICS, "non_finite")}
     return Errors(at=worst.at, **numbers)
 
 
 def _flip(picture: Array, truth: Array) -> float:
-    """FLIP for screens: of what a screen can show, from linear light; by OpenImageIO."""
+    """Returns the mean of FLIP for linear pictures (H, W, 3), which are clipped to [0, 1], the range of a screen."""
     import OpenImageIO as oiio
 
-    shown = [oiio.ImageBuf(np.ascontiguousarray(np.clip(p, 0, 1), dtype=np.float32)) for p in (truth, picture)]
-    difference = oiio.ImageBufAlgo.FLIP_diff(shown[0], shown[1], hdr=0, ppd=PIXELS_PER_DEGREE)
+    clipped = [oiio.ImageBuf(np.ascontiguousarray(np.clip(p, 0, 1), dtype=np.float32)) for p in (truth, picture)]
+    difference = oiio.ImageBufAlgo.FLIP_diff(clipped[0], clipped[1], hdr=0, ppd=PIXELS_PER_DEGREE)
     return float(np.mean(np.asarray(difference.get_pixels(oiio.FLOAT))))

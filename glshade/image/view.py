@@ -1,10 +1,11 @@
-"""View transform: how a linear picture is shown on a display, as an OpenColorIO configuration says; by OpenImageIO."""
+"""View transform: turns a linear picture into the numbers of a display, as an OpenColorIO configuration defines them."""
 
 from __future__ import annotations
 
 import os
 from dataclasses import dataclass
 from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,20 +13,26 @@ from numpy.typing import NDArray
 
 from glshade.document import nearest
 from glshade.errors import SceneError
-from glshade.image.image import Image
-from glshade.scene.scene import Film
+from glshade.image.image import Encoding, Image
 
-# What OpenColorIO carries itself: an ACES configuration for computer graphics.
+# The configuration built into OpenColorIO: ACES for computer graphics.
 DEFAULT = "ocio://default"
-# What glshade draws in, by the names that configurations have for it; ACES 1's had the last.
+# Names that configurations give to linear Rec. 709, the colour space of glshade's float pictures. The last is from ACES 1.
 LINEAR = ("lin_rec709_scene", "lin_rec709", "lin_srgb", "Linear Rec.709 (sRGB)", "Linear Rec.709", "Utility - Linear - sRGB")
-# Colour interop ids of what 8-bit files are taken for where they say nothing.
+# The colour interop ids of sRGB, which programs assume where an 8-bit file names no colour space.
 SRGB = frozenset({"srgb_rec709_display", "srgb_rec709_scene"})
 
 
 @dataclass(frozen=True)
 class ViewTransform:
-    """A view of a display in a configuration. space: its name for linear Rec. 709. encoding: of the result, as Image has it."""
+    """A view of a display in an OpenColorIO configuration.
+
+    config: the configuration's file or its name, such as "ocio://default".
+    display: the display's name in the configuration.
+    view: the name of one of the display's views.
+    space: the configuration's name for linear Rec. 709.
+    encoding: the encoding of the resulting picture, as Image.encoding has it.
+    """
 
     config: str
     display: str
@@ -34,21 +41,31 @@ class ViewTransform:
     encoding: str
 
     @classmethod
-    def of(cls, film: Film) -> ViewTransform:
-        """What a film asks for. Errors: SceneError, with the names that there are."""
-        if film.ocio is not None:
-            return _found(str(film.ocio), "film.ocio", film.display, film.view)
+    def find(cls, ocio: str | Path | None, display: str | None, view: str | None) -> ViewTransform:
+        """Returns the view transform that a film asks for.
+
+        ocio: a configuration's file or name; by default $OCIO, else the configuration built into OpenColorIO.
+        display: a display's name; by default the configuration's default display.
+        view: a view's name; by default the display's default view.
+        Errors: SceneError, with the names that the configuration has.
+        """
+        if ocio is not None:
+            return _loaded(str(ocio), "film.ocio", display, view)
         from_environment = os.environ.get("OCIO")
-        return _found(from_environment or DEFAULT, "$OCIO" if from_environment else "film.ocio", film.display, film.view)
+        return _loaded(from_environment or DEFAULT, "$OCIO" if from_environment else "film.ocio", display, view)
 
     def __call__(self, image: Image) -> Image:
-        """uint8 of a float image; colours are transformed before alpha multiplies them. Errors: SceneError."""
+        """Returns a float picture as uint8 with straight alpha. The transform gets colours without alpha.
+
+        Errors: SceneError.
+        """
         return image.through(self._transformed, self.encoding)
 
     def _transformed(self, rgb: NDArray[np.float32]) -> NDArray[Any]:
+        """Returns display-encoded colours (H, W, 3) for linear Rec. 709 colours. Errors: SceneError."""
         import OpenImageIO as oiio
 
-        shown = oiio.ImageBufAlgo.ociodisplay(
+        result = oiio.ImageBufAlgo.ociodisplay(
             oiio.ImageBuf(np.ascontiguousarray(rgb)),
             self.display,
             self.view,
@@ -56,20 +73,31 @@ class ViewTransform:
             unpremult=False,
             colorconfig=self.config,
         )
-        if shown.has_error:
-            raise SceneError(f'film.view: "{self.view}" of {self.config}: {" ".join(shown.geterror().split())}')
-        pixels: NDArray[Any] = np.asarray(shown.get_pixels(oiio.FLOAT))
+        if result.has_error:
+            raise SceneError(f'film.view: "{self.view}" of {self.config}: {" ".join(result.geterror().split())}')
+        pixels: NDArray[Any] = np.asarray(result.get_pixels(oiio.FLOAT))
         return pixels
 
 
-def shown(image: Image, film: Film) -> Image:
-    """The 8-bit picture of a linear one, as the film has it. Errors: SceneError."""
-    return ViewTransform.of(film)(image) if film.transformed else image.encoded(film.encoding)
+def displayed(
+    image: Image, encoding: Encoding, *, ocio: str | Path | None = None, display: str | None = None, view: str | None = None
+) -> Image:
+    """Returns a linear picture as uint8, by a view transform if a display or a view is given, and otherwise in `encoding`.
+
+    ocio, display, view: as for ViewTransform.find. Errors: SceneError.
+    """
+    if display is None and view is None:
+        return image.encoded(encoding)
+    return ViewTransform.find(ocio, display, view)(image)
 
 
 @lru_cache(maxsize=8)
-def _found(name: str, key: str, display: str | None, view: str | None) -> ViewTransform:
-    """key: who named the configuration. Configurations take 30 ms to read, so this is kept."""
+def _loaded(name: str, key: str, display: str | None, view: str | None) -> ViewTransform:
+    """Returns the view transform in the configuration `name`; cached, because OpenColorIO takes 30 ms to read a configuration.
+
+    key: the place that names the configuration, for messages: "film.ocio" or "$OCIO".
+    Errors: SceneError.
+    """
     import OpenImageIO as oiio
 
     config = oiio.ColorConfig(name)

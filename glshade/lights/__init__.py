@@ -1,9 +1,12 @@
-"""The lights: one module each, found by its presence, beside one GLSL file of the same name.
+"""Lights: the types of light of a scene file, one module each, which is found by its presence.
 
-A light's intensity I is the radiance that a white Lambertian facing it would show (at distance 1 where it falls off), so a
-surface reflects pi (f cos) I falloff. It may be negative.
+Each light has a GLSL file of the same name under shaders/light/. Its intensity I is the radiance of a white Lambertian surface
+that faces it, at distance 1 if the light falls off. So a surface reflects pi (f cos) I falloff, where f cos is
+the BRDF times n.l. The intensity may be negative.
 """
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -15,57 +18,95 @@ from glshade.document import Document, Finite, Triple
 from glshade.found import Found
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FalloffLaw:
+    """A law by which light weakens with the distance r.
+
+    power: the light is divided by r to this power.
+    name: the name of the law's GLSL file under shaders/falloff/, which is also the end of its function's name; empty where
+        the light does not weaken.
+    """
+
+    power: int
+    name: str
+
+
 Falloff = Literal["none", "1/r", "1/r^2"]
+FALLOFFS: Mapping[Falloff, FalloffLaw] = {
+    "none": FalloffLaw(0, ""),
+    "1/r": FalloffLaw(1, "inverse"),
+    "1/r^2": FalloffLaw(2, "inverse_square"),
+}
 
 
 class Light(Document):
-    """What every light has."""
+    """The keys that every light has."""
 
     type: str
-    name: str | None = Field(None, description="for messages")
-    colour: Triple = Field((1.0, 1.0, 1.0), description="linear Rec. 709")
+    name: str | None = Field(None, description="name of the light, for messages and dotted keys")
+    colour: Triple = Field((1.0, 1.0, 1.0), description="colour of the light, linear Rec. 709")
     intensity: Finite = Field(1.0, description="multiplies the colour; negative light takes light away")
-    only: tuple[str, ...] | None = Field(None, description="names of the only objects it lights; left out: all")
+    only: tuple[str, ...] | None = Field(None, description="names of the only objects that it lights; left out: all objects")
 
-    # A light without a direction adds `ambient reflectance x intensity`, and has no illuminate().
+    # An omnidirectional light reaches a surface from all sides. A surface shows illuminate(light, n) times its model's ambient
+    # reflectance.
     omnidirectional: ClassVar[bool] = False
+    # Whether an omnidirectional light is the same for every normal. All such lights are added up to one colour before drawing.
+    ignores_normal: ClassVar[bool] = False
 
     @property
     def is_negative(self) -> bool:
-        """Whether it takes light away in some channel."""
+        """Whether the light takes light away in at least one channel."""
         return min(c * self.intensity for c in self.colour) < 0
 
     @classmethod
     def fields(cls) -> dict[str, str]:
-        """The GLSL struct's fields in their order: name -> vec3 or float."""
+        """Returns the fields of the light's GLSL struct in their order: name -> "vec3" or "float"."""
+        # The types can be read from the uniforms of any light of the class. A light with a position cannot be made
+        # without a position.
         anywhere = {"position": (0.0, 0.0, 0.0)} if "position" in cls.model_fields else {}
         values = cls.model_validate(anywhere).uniforms(np.zeros(3))
         return {name: "vec3" if np.size(value) == 3 else "float" for name, value in values.items()}
 
     def scaled(self, unit: float) -> "Light":
-        """The light of the same picture with all lengths times `unit`."""
+        """Returns the light that gives the same picture where every length of the scene is multiplied by `unit`."""
         return self
 
     def uniforms(self, eye: Array) -> dict[str, Any]:
-        """The GLSL struct's fields in their order, float64; positions relative to `eye` (3,)."""
+        """Returns the values of the GLSL struct's fields in their order, in float64.
+
+        eye: the origin of camera-relative space (3,), which positions are made relative to [scene units].
+        """
         return {"intensity": np.multiply(self.colour, self.intensity)}
 
     @staticmethod
-    def illuminate(light: Any, p: Array) -> tuple[Array, Array]:
-        """(l, e): unit directions to the light and its strength before falloff, (..., 3), at the points p (..., 3)."""
+    def illuminate(light: Any, where: Array) -> Any:
+        """Returns the light that arrives at points of a surface, in float64.
+
+        The shape (..., 3) stands for any leading shape with three columns.
+        A directed light returns a pair (l, e): the unit directions to the light (..., 3), and the light's strength (..., 3)
+        before falloff. An omnidirectional light returns the strength (..., 3) that multiplies the model's ambient reflectance.
+        light: an object whose attributes are the fields of `uniforms`.
+        where: for a directed light, the points (..., 3) relative to the eye [scene units]; for an omnidirectional light, the
+            unit normals (..., 3).
+        """
         raise NotImplementedError
 
 
 class Placed(Light):
-    """What every light at a place has."""
+    """The keys that every light with a position has."""
 
-    position: tuple[Finite, Finite, Finite] = Field(description="where it is [scene units]")
-    falloff: Falloff = Field("1/r^2", description="how it weakens with distance: none, 1/r, or the physical 1/r^2")
-    r_min: Annotated[float, Field(gt=0)] = Field(1e-3, description="within this distance it grows no brighter [scene units]")
+    position: tuple[Finite, Finite, Finite] = Field(description="position of the light [scene units]")
+    falloff: Falloff = Field("1/r^2", description="how the light weakens with distance: none, 1/r, or the physical 1/r^2")
+    r_min: Annotated[float, Field(gt=0)] = Field(
+        1e-3, description="the light grows no brighter within this distance [scene units]"
+    )
 
     def scaled(self, unit: float) -> Light:
-        # What falls off by a power of the distance shines stronger by that power.
-        gain = {"none": 1.0, "1/r": unit, "1/r^2": unit * unit}[self.falloff]
+        # At distances that are `unit` times as long, the light has to be stronger by the falloff's power to look the same.
+        gain = unit ** FALLOFFS[self.falloff].power
         return self.model_copy(
             update={
                 "position": tuple(c * unit for c in self.position),
@@ -79,7 +120,11 @@ class Placed(Light):
 
 
 def direction_and_distance(to_light: Array) -> tuple[Array, Array]:
-    """(..., 3) unit, (...) [scene units]; at the light itself the direction is (0, 0, 0): no light."""
+    """Returns the unit directions (..., 3) and the lengths (...) [scene units] of the vectors to a light (..., 3).
+
+    At the light itself the direction is (0, 0, 0), so that no light arrives there.
+    """
+    # The vectors are scaled to a largest component of 1 first, so that their squares neither overflow nor underflow.
     scale = np.max(np.abs(to_light), axis=-1, keepdims=True)
     scaled = to_light / np.where(scale > 0, scale, 1.0)
     length = np.linalg.norm(scaled, axis=-1, keepdims=True)

@@ -10,10 +10,12 @@ from glshade.lights import Array, Light, direction_and_distance
 
 
 class DirectionalLight(Light):
-    """The same direction and strength everywhere (lecture slide 49)."""
+    """Has the same direction and strength everywhere (lecture slide 49)."""
 
     type: Literal["directional"] = "directional"
-    direction: Direction = Field((-0.4, -0.6, -0.7), description="the way the light travels: from the light to the scene")
+    direction: Direction = Field(
+        (-0.4, -0.6, -0.7), description="direction in which the light travels, from the light to the scene"
+    )
 
     def uniforms(self, eye: Array) -> dict[str, Any]:
         toward, _ = direction_and_distance(-np.array(self.direction))

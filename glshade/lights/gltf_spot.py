@@ -1,4 +1,4 @@
-"""gltf_spot: a spot light that fades as glTF's and pyrender's do."""
+"""gltf_spot: a spot light that fades at its edge like the spot lights of glTF and pyrender."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -10,20 +10,23 @@ from pydantic import Field
 from glshade.document import Direction
 from glshade.lights import Array, Placed, direction_and_distance
 
-# The narrowest edge, in cos: the extension's own, and pyrender's.
+# The least difference of the cosines of the inner and outer angle. KHR_lights_punctual and pyrender use the same.
 NARROWEST = 1e-3
 
 
 class GltfSpotLight(Placed):
-    """Whole within the inner angle, nothing past the outer, between them the square of (cos - cos outer) / (cos inner - cos
-    outer): KHR_lights_punctual, inner and outer cone angles."""
+    """Shines fully within the inner angle and not at all beyond the outer one. Between them the light is multiplied by the
+    square of (cos a - cos outer) / (cos inner - cos outer), where a is the angle from the axis, as in KHR_lights_punctual,
+    "Inner and Outer Cone Angles"."""
 
     type: Literal["gltf_spot"] = "gltf_spot"
-    direction: Direction = Field((0.0, -1.0, 0.0), description="the way the cone points: from the light to the scene")
+    direction: Direction = Field((0.0, -1.0, 0.0), description="direction of the cone's axis, from the light to the scene")
     inner: Annotated[float, Field(ge=0, le=180)] = Field(
-        0.0, description="from the axis to where the light begins to fade [degrees]"
+        0.0, description="angle from the axis at which the light begins to fade [degrees]"
     )
-    outer: Annotated[float, Field(gt=0, le=180)] = Field(45.0, description="from the axis to where the light ends [degrees]")
+    outer: Annotated[float, Field(gt=0, le=180)] = Field(
+        45.0, description="angle from the axis beyond which there is no light [degrees]"
+    )
 
     @classmethod
     def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
@@ -34,7 +37,7 @@ class GltfSpotLight(Placed):
 
     def uniforms(self, eye: Array) -> dict[str, Any]:
         axis, _ = direction_and_distance(-np.array(self.direction))
-        # 1 - cos x = 2 sin^2(x / 2) keeps its digits for small angles.
+        # For small angles 1 - cos x would lose its digits; 2 sin^2(x / 2) is equal and keeps them.
         inner, outer = (2 * math.sin(math.radians(angle) / 2) ** 2 for angle in (self.inner, self.outer))
         scale = 1 / max(outer - inner, NARROWEST)
         return {**super().uniforms(eye), "cone_outer": outer, "axis": axis, "cone_scale": scale}

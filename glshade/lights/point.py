@@ -1,4 +1,4 @@
-"""point: a light at one place, alike in all directions."""
+"""point: a light at one position that shines equally in all directions."""
 
 from typing import Any, Literal
 
@@ -8,7 +8,7 @@ from glshade.lights import Array, Placed, direction_and_distance
 
 
 class PointLight(Placed):
-    """Shines alike in all directions (lecture slide 49)."""
+    """Shines equally in all directions (lecture slide 49)."""
 
     type: Literal["point"] = "point"
 

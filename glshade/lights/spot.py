@@ -12,14 +12,17 @@ from glshade.lights import Array, Placed, direction_and_distance
 
 
 class SpotLight(Placed):
-    """Whole within the inner angle, nothing past the outer, smoothstep of 1 - cos between (lecture slide 52)."""
+    """Shines fully within the inner angle and not at all beyond the outer one. Between them the light fades by a smoothstep of
+    1 - cos a, where a is the angle from the axis (lecture slide 52)."""
 
     type: Literal["spot"] = "spot"
-    direction: Direction = Field((0.0, -1.0, 0.0), description="the way the cone points: from the light to the scene")
+    direction: Direction = Field((0.0, -1.0, 0.0), description="direction of the cone's axis, from the light to the scene")
     inner: Annotated[float, Field(ge=0, le=180)] | None = Field(
-        None, description="from the axis to where the light begins to fade; left out: two thirds of outer [degrees]"
+        None, description="angle from the axis at which the light begins to fade; left out: two thirds of outer [degrees]"
     )
-    outer: Annotated[float, Field(gt=0, le=180)] = Field(30.0, description="from the axis to where the light ends [degrees]")
+    outer: Annotated[float, Field(gt=0, le=180)] = Field(
+        30.0, description="angle from the axis beyond which there is no light [degrees]"
+    )
 
     @classmethod
     def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
@@ -31,9 +34,9 @@ class SpotLight(Placed):
     def uniforms(self, eye: Array) -> dict[str, Any]:
         axis, _ = direction_and_distance(-np.array(self.direction))
         start = 2 * self.outer / 3 if self.inner is None else self.inner
-        # 1 - cos x = 2 sin^2(x / 2) keeps its digits for small angles.
+        # For small angles 1 - cos x would lose its digits; 2 sin^2(x / 2) is equal and keeps them.
         inner, outer = (2 * math.sin(math.radians(angle) / 2) ** 2 for angle in (start, self.outer))
-        # An edge of no width would divide 0 by 0; one part in a million of the cone is far below a pixel.
+        # Without a least width, an edge of width 0 would divide 0 by 0. A millionth of the cone is far less than a pixel.
         width = max(outer - inner, 1e-6 * outer)
         return {**super().uniforms(eye), "cone_outer": outer, "axis": axis, "cone_scale": 1 / width}
 

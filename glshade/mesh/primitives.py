@@ -1,7 +1,7 @@
-"""Shapes made by formula: sphere, icosphere, cube, plane, torus, cylinder, cone.
+"""Primitives: meshes that are computed from formulas: sphere, icosphere, cube, plane, torus, cylinder and cone.
 
-All are of unit size, wound counter-clockwise seen from outside, with analytic normals and, but for the icosphere,
-uvs. Where a surface closes on itself its vertices are doubled, so that u runs from 0 to 1 without a jump.
+All have unit size, triangles that are counter-clockwise seen from outside, and exact normals. All but the icosphere have uvs.
+Where a surface closes on itself its vertices are doubled, so that u runs from 0 to 1 without a jump.
 """
 
 from __future__ import annotations
@@ -10,51 +10,50 @@ from collections.abc import Callable
 
 import numpy as np
 
-from glshade.mesh.mesh import Array, Float64, Mesh, ordered
+from glshade.arrays import Array, Float64
+from glshade.mesh.mesh import Mesh
+from glshade.mesh.order import ordered
 
 
 def sphere(segments: int = 64, rings: int = 32) -> Mesh:
-    """Sphere of radius 1 at the origin, with its poles on +-y.
+    """Returns a sphere with radius 1 about the origin, whose poles lie on +-y.
 
-    segments: divisions of longitude, >= 3; rings: divisions of latitude, >= 2.
-    u is longitude, from -z counter-clockwise seen from +y, so that +z is the middle of the picture; v is latitude, from
-    south to north.
+    segments: the number of divisions of longitude, at least 3.
+    rings: the number of divisions of latitude, at least 2.
+
+    u is the longitude. It runs counter-clockwise seen from +y and starts at -z, so that +z is the middle of the picture. v is
+    the latitude, from south to north. Errors: ValueError.
     """
     _at_least("sphere", segments=(segments, 3), rings=(rings, 2))
     latitude = np.linspace(-np.pi / 2, np.pi / 2, rings + 1)
     radius, height = np.cos(latitude), np.sin(latitude)
-    radius[[0, -1]] = 0.0  # cos(pi/2) is 6e-17: the pole would be a ring
-    normals, uvs, triangles = _revolve(radius, height, radius, height, latitude / np.pi + 0.5, segments)
+    radius[[0, -1]] = 0.0  # cos(pi/2) is 6e-17 in float64, which would make a ring of the pole
+    normals, uvs, triangles = _revolve(radius, height, radius, latitude / np.pi + 0.5, segments)
     positions = normals.copy()
     return _mesh(positions, triangles, normals, uvs)
 
 
 def icosphere(subdivisions: int = 4) -> Mesh:
-    """Sphere of radius 1 at the origin from an icosahedron, each triangle split in four `subdivisions` times.
+    """Returns a sphere with radius 1 about the origin: an icosahedron whose triangles are split in four `subdivisions` times.
 
-    20 * 4**subdivisions triangles of nearly equal size. It has no uvs: no seam would keep its triangles whole.
+    It has 20 * 4**subdivisions triangles of nearly equal size. It has no uvs, because any seam would cut through triangles.
+    Errors: ValueError.
     """
     _at_least("icosphere", subdivisions=(subdivisions, 0))
     g = (1 + np.sqrt(5)) / 2
-    p = np.array(
-        [
-            *([-1, g, 0], [1, g, 0], [-1, -g, 0], [1, -g, 0], [0, -1, g], [0, 1, g]),
-            *([0, -1, -g], [0, 1, -g], [g, 0, -1], [g, 0, 1], [-g, 0, -1], [-g, 0, 1]),
-        ]
-    )
-    t = np.array(
-        [
-            *([0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11]),
-            *([1, 5, 9], [5, 11, 4], [11, 10, 2], [10, 7, 6], [7, 1, 8]),
-            *([3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9]),
-            *([4, 9, 5], [2, 4, 11], [6, 2, 10], [8, 6, 7], [9, 8, 1]),
-        ]
-    )
+    p = np.array([
+        [-1, g, 0], [1, g, 0], [-1, -g, 0], [1, -g, 0], [0, -1, g], [0, 1, g],
+        [0, -1, -g], [0, 1, -g], [g, 0, -1], [g, 0, 1], [-g, 0, -1], [-g, 0, 1],
+    ])  # fmt: skip
+    t = np.array([
+        [0, 11, 5], [0, 5, 1], [0, 1, 7], [0, 7, 10], [0, 10, 11], [1, 5, 9], [5, 11, 4], [11, 10, 2], [10, 7, 6], [7, 1, 8],
+        [3, 9, 4], [3, 4, 2], [3, 2, 6], [3, 6, 8], [3, 8, 9], [4, 9, 5], [2, 4, 11], [6, 2, 10], [8, 6, 7], [9, 8, 1],
+    ])  # fmt: skip
     p /= np.linalg.norm(p, axis=1, keepdims=True)
     sides = np.sort(np.stack([t, np.roll(t, -1, axis=1)], axis=2), axis=2)  # (T, 3, 2): ab, bc, ca
     ends, edge = np.unique(sides.reshape(-1, 2), axis=0, return_inverse=True)
     edge = edge.reshape(-1, 3)
-    # Edges are numbered along with the triangles: to find them again each time would take longer than all the rest.
+    # The edges are numbered along with the triangles. To find them again in each round would take longer than all the rest.
     for _ in range(subdivisions):
         middle = p[ends[:, 0]] + p[ends[:, 1]]
         middle /= np.sqrt(np.square(middle).sum(axis=1, keepdims=True))
@@ -77,7 +76,7 @@ def icosphere(subdivisions: int = 4) -> Mesh:
 
 
 def cube() -> Mesh:
-    """Cube from -1 to 1 with sharp edges: 24 vertices; each side carries the whole unit square of uvs."""
+    """Returns a cube from -1 to 1 with sharp edges and 24 vertices. The uvs of each side cover the whole unit square."""
     corner = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     y = np.array([0.0, 1.0, 0.0])
     z = np.array([0.0, 0.0, 1.0])
@@ -95,7 +94,10 @@ def cube() -> Mesh:
 
 
 def plane(segments: int = 1) -> Mesh:
-    """Square y = 0 from -1 to 1 in x and z, facing +y, of `segments` x `segments` quads; u along x, v along -z."""
+    """Returns the square y = 0 from -1 to 1 in x and z, facing +y, cut in `segments` x `segments` quads.
+
+    u runs along x and v along -z. Errors: ValueError.
+    """
     _at_least("plane", segments=(segments, 1))
     s = np.linspace(0.0, 1.0, segments + 1)
     v, u = (a.reshape(-1) for a in np.meshgrid(s, s, indexing="ij"))
@@ -105,10 +107,13 @@ def plane(segments: int = 1) -> Mesh:
 
 
 def torus(segments: int = 96, sides: int = 48, minor: float = 0.4) -> Mesh:
-    """Torus about the y axis with major radius 1 and radius `minor` of the tube, 0 < minor <= 1.
+    """Returns a torus about the y axis; the middle of its tube is a circle with radius 1.
 
-    segments: divisions round the axis, >= 3; sides: divisions round the tube, >= 3. u runs round the axis, v round
-    the tube from its inner side, first downward.
+    segments: the number of divisions round the axis, at least 3.
+    sides: the number of divisions round the tube, at least 3.
+    minor: the radius of the tube, 0 < minor <= 1.
+
+    u runs round the axis. v runs round the tube; it starts at the inner side and goes downward first. Errors: ValueError.
     """
     _at_least("torus", segments=(segments, 3), sides=(sides, 3))
     if not 0 < minor <= 1:
@@ -117,7 +122,7 @@ def torus(segments: int = 96, sides: int = 48, minor: float = 0.4) -> Mesh:
     c, s = np.cos(angle), np.sin(angle)
     c[-1], s[-1] = c[0], s[0]  # the last ring lies exactly on the first
     v = np.linspace(0.0, 1.0, sides + 1)
-    normals, uvs, triangles = _revolve(c, s, 1 + minor * c, s, v, segments)
+    normals, uvs, triangles = _revolve(c, s, 1 + minor * c, v, segments)
     direction = _circle(segments)
     ring = (1 + minor * c)[:, None, None] * direction
     ring[..., 1] += (minor * s)[:, None]
@@ -125,22 +130,26 @@ def torus(segments: int = 96, sides: int = 48, minor: float = 0.4) -> Mesh:
 
 
 def cylinder(segments: int = 64) -> Mesh:
-    """Capped cylinder about the y axis, radius 1, y from -1 to 1; the rims are sharp.
+    """Returns a cylinder with caps about the y axis, with radius 1, from y = -1 to y = 1. Its rims are sharp.
 
-    On the wall u is longitude and v height; the caps carry a disc of uvs.
+    segments: the number of divisions round the axis, at least 3.
+
+    On the wall u is the longitude and v the height; on the caps the uvs form a disc. Errors: ValueError.
     """
     _at_least("cylinder", segments=(segments, 3))
     return _capped(np.array([1.0, 1.0]), np.array([1.0, 1.0]), np.array([0.0, 0.0]), (-1, 1), segments)
 
 
 def cone(segments: int = 64) -> Mesh:
-    """Capped cone about the y axis, radius 1 at y = -1, its apex at y = 1; the rim is sharp.
+    """Returns a cone with a cap about the y axis, with radius 1 at y = -1 and its apex at y = 1. Its rim is sharp.
 
-    On the wall u is longitude and v height; the cap carries a disc of uvs. Each triangle has its own normal at the
-    apex, that of its middle: the apex itself has none.
+    segments: the number of divisions round the axis, at least 3.
+
+    On the wall u is the longitude and v the height; on the cap the uvs form a disc. The apex has no normal, so each triangle
+    has a vertex of its own there, with the normal of the triangle's middle. Errors: ValueError.
     """
     _at_least("cone", segments=(segments, 3))
-    slope = 1 / np.sqrt(5)  # the wall falls 2 over a radius of 1
+    slope = 1 / np.sqrt(5)  # the wall falls by 2 over a radius of 1
     across, up = np.array([2 * slope, 2 * slope]), np.array([slope, slope])
     return _capped(np.array([1.0, 0.0]), across, up, (-1,), segments)
 
@@ -157,22 +166,27 @@ PRIMITIVES: dict[str, Callable[..., Mesh]] = {
 
 
 def _at_least(shape: str, **counts: tuple[int, int]) -> None:
+    """Checks counts, each given as (value, least allowed value). Errors: ValueError."""
     for name, (value, least) in counts.items():
         if value < least:
             raise ValueError(f"{shape}: {name} must be at least {least}, not {value}")
 
 
 def _mesh(positions: Float64, triangles: Array, normals: Float64, uvs: Float64 | None) -> Mesh:
+    """Returns the mesh with these arrays, without the vertices that no triangle uses, in an order that suits caches."""
     used = np.zeros(len(positions), dtype=bool)
     used[triangles] = True
-    if not used.all():  # a pole has one copy fewer than its ring has columns
+    if not used.all():  # a pole has one vertex for each segment, which is one fewer than its ring has columns
         triangles = (np.cumsum(used) - 1)[triangles]
         positions, normals, uvs = positions[used], normals[used], None if uvs is None else uvs[used]
     return ordered(Mesh.build(positions, triangles, normals, uvs))
 
 
 def _circle(segments: int, offset: float = 0.0) -> Float64:
-    """(segments + 1, 3) unit directions round the y axis, counter-clockwise from -z; the last is exactly the first."""
+    """Returns (segments + 1, 3) unit directions round the y axis, counter-clockwise from -z. The last equals the first exactly.
+
+    offset: the angle of the first direction, in segments.
+    """
     angle = (np.arange(segments + 1) + offset) * (2 * np.pi / segments)
     circle = np.stack([-np.sin(angle), np.zeros_like(angle), -np.cos(angle)], axis=1)
     circle[-1] = circle[0]
@@ -180,19 +194,22 @@ def _circle(segments: int, offset: float = 0.0) -> Float64:
 
 
 def _grid(columns: int, rows: int) -> Array:
-    """(2 rows columns, 3) triangles over a grid of (rows + 1) x (columns + 1) vertices, the column running fastest."""
+    """Returns (2 rows columns, 3) triangles of a grid of (rows + 1) x (columns + 1) vertices, which are numbered row by row."""
     a = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)).reshape(-1)
     b, c, d = a + 1, a + columns + 2, a + columns + 1
     return np.stack([a, b, c, a, c, d], axis=1).reshape(-1, 3)
 
 
-def _revolve(
-    across: Float64, up: Float64, radius: Float64, height: Float64, v: Float64, segments: int
-) -> tuple[Float64, Float64, Array]:
-    """Normals, uvs and triangles of a profile turned round the y axis; its outside is to the right going up.
+def _revolve(across: Float64, up: Float64, radius: Float64, v: Float64, segments: int) -> tuple[Float64, Float64, Array]:
+    """Returns normals (V, 3), uvs (V, 2) and triangles (T, 3) of the surface that a profile sweeps as it turns round the y
+    axis.
 
-    across, up (P,): the normal's parts away from and along the axis. Where radius (P,) is 0 the point is a pole: each
-    of its triangles has its own copy, with u at the triangle's middle, and the triangle without area is left out.
+    The profile has P points. The outside lies to the right of someone who goes along it.
+    across: (P,) the component of the normal away from the axis.
+    up: (P,) the component of the normal along the axis.
+    radius: (P,) the distance from the axis. Where it is 0 the point is a pole: each triangle has a vertex of its own there,
+        with u at the middle of the triangle, and the triangles without area are left out.
+    v: (P,) the second texture coordinate.
     """
     rings = len(v)
     normals = across[:, None, None] * _circle(segments)
@@ -204,20 +221,25 @@ def _revolve(
         u[pole] += 0.5 / segments
         if pole == 0:
             keep[0, :, 0] = False
-            # The remaining triangle (a, c, d) has the pole at its column's own vertex a already.
+            # The remaining triangle (a, c, d) has the pole at a, which is the vertex of its own column already.
         else:
             keep[pole - 1, :, 1] = False
-            # (a, b, c) has the pole at c, in the next column.
+            # The remaining triangle (a, b, c) has the pole at c, which is the vertex of the next column.
             triangles[pole - 1, :, 0, 2] -= 1
     uvs = np.stack([u, np.broadcast_to(v[:, None], u.shape)], axis=-1).reshape(-1, 2)
     return normals.reshape(-1, 3), uvs, triangles[keep]
 
 
 def _capped(radius: Float64, across: Float64, up: Float64, caps: tuple[int, ...], segments: int) -> Mesh:
-    """A wall between y = -1 and y = 1 with the given radii and normals there, and caps at the y in `caps`."""
+    """Returns a wall between y = -1 and y = 1, with caps.
+
+    radius: (2,) the radii of the wall at y = -1 and y = 1.
+    across, up: (2,) the components of the normals at y = -1 and y = 1, away from the axis and along it.
+    caps: the values of y, -1 or 1, at which the wall has a cap.
+    """
     circle = _circle(segments)
     height = np.array([-1.0, 1.0])
-    normals, uvs, triangles = _revolve(across, up, radius, height, np.array([0.0, 1.0]), segments)
+    normals, uvs, triangles = _revolve(across, up, radius, np.array([0.0, 1.0]), segments)
     wall = radius[:, None, None] * circle
     wall[..., 1] += height[:, None]
     if radius[1] == 0:

@@ -1,7 +1,8 @@
-"""Subdivision: a mesh cut finer without a change of shape, everywhere or only where its light asks for it.
+"""Subdivision: cuts the triangles of a mesh without a change of its shape, everywhere or only where its light requires it.
 
-Light per vertex is linear in between, so a lobe narrower than a triangle is missed. More vertices find it; new ones lie on
-the flat triangles, with the normals, tangents and coordinates that interpolation gives there.
+Light that is computed per vertex is interpolated linearly over a triangle, so a highlight that is narrower than a triangle is
+missed. More vertices make it visible. New vertices lie on the flat triangles and have interpolated normals, tangents, uvs and
+colours.
 """
 
 from __future__ import annotations
@@ -13,19 +14,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.mesh.mesh import Mesh, normalised, weld
+from glshade.mesh.mesh import Mesh
+from glshade.mesh.welding import normalised, weld
 
 Array = NDArray[Any]
 Light = Callable[[Mesh], Array]
 
-# An edge is looked at in these places between its ends, so that a lobe which misses the middle is seen too.
+# The light on an edge is compared at these fractions of its length, so that a highlight beside its middle is found too.
 PLACES = (0.25, 0.5, 0.75)
-# Where cutting stops: 2^8 pieces an edge, and a mesh of four million triangles.
+# Refinement ends after DEEPEST rounds, which cut an edge into 2^8 pieces, or before the mesh has more than LARGEST triangles.
 DEEPEST, LARGEST = 8, 4_000_000
 
 
 def subdivided(mesh: Mesh, levels: int) -> Mesh:
-    """Every triangle cut in four, `levels` times."""
+    """Returns the mesh with every triangle cut in four, `levels` times."""
     for _ in range(levels):
         edges = Edges.of(mesh)
         mesh = split(mesh, edges, np.ones(len(edges.ends), dtype=np.bool_))
@@ -33,10 +35,13 @@ def subdivided(mesh: Mesh, levels: int) -> Mesh:
 
 
 def refined(mesh: Mesh, light: Light, tolerance: float) -> Mesh:
-    """Cut where light interpolated between vertices is off by more than the tolerance.
+    """Returns the mesh, cut where the error of light that is interpolated between vertices exceeds the tolerance.
 
-    light(mesh) -> (V, C): what each vertex shows. An edge is cut where it is off at one of PLACES, all three of a triangle
-    where its middle is. Few vertices go far: only what was cut is looked at again.
+    light: a function that gives the light (V, C) at the vertices of a mesh, in C channels.
+    tolerance: the largest error that is allowed, in the unit of the light.
+
+    An edge is cut if the error at one of PLACES is too large. All three edges of a triangle are cut if the error at its middle
+    is too large. Each round looks only at the triangles that the round before has cut.
     """
     doubtful = np.ones(len(mesh.triangles), dtype=np.bool_)
     for _ in range(DEEPEST):
@@ -58,16 +63,19 @@ def refined(mesh: Mesh, light: Light, tolerance: float) -> Mesh:
             break
         cut = marked[edges.sides].any(axis=1)
         mesh = split(mesh, edges, marked)
-        # split() puts the pieces behind what stayed whole.
+        # split() puts the pieces of cut triangles behind the triangles that were not cut.
         doubtful = np.arange(len(mesh.triangles)) >= int((~cut).sum())
     return mesh
 
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """The edges of a mesh. ends (E, 2): vertices. sides (T, 3): each triangle's edges, the first from its corner 0 to 1.
+    """The edges of a mesh.
 
-    place (E,): alike for edges between the same positions, which are cut together or not at all, so that nothing gapes.
+    ends: (E, 2) int64, the vertices at the two ends of each edge.
+    sides: (T, 3) int64, the edges of each triangle. The first runs from its corner 0 to its corner 1.
+    place: (E,) int64, a label that is equal for edges between the same positions. Such edges are cut together or not at all,
+        so that the mesh gets no gaps.
     """
 
     ends: Array
@@ -76,7 +84,7 @@ class Edges:
 
     @classmethod
     def of(cls, mesh: Mesh) -> Edges:
-        """All of a mesh's."""
+        """Returns all edges of a mesh."""
         corners = mesh.triangles.astype(np.int64)
         sides = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
         keys, where = np.unique(sides[:, 0] << 32 | sides[:, 1], return_inverse=True)
@@ -86,7 +94,7 @@ class Edges:
         return cls(ends, where.reshape(-1, 3), place)
 
     def together(self, marked: Array) -> Array:
-        """Marked, and those that lie on them."""
+        """Returns marks (E,) for the edges of `marked` (E,) and for all other edges between the same positions."""
         some = np.zeros(int(self.place.max(initial=-1)) + 1, dtype=np.bool_)
         some[self.place[marked]] = True
         result: Array = some[self.place]
@@ -94,7 +102,10 @@ class Edges:
 
 
 def split(mesh: Mesh, edges: Edges, marked: Array) -> Mesh:
-    """The mesh with the marked (E,) edges cut in their middles: triangles in two, three or four. Whole ones come first."""
+    """Returns the mesh with the edges of `marked` (E,) cut at their middles. Their triangles become two, three or four pieces.
+
+    The triangles that are not cut come first.
+    """
     number = np.cumsum(marked) - 1 + len(mesh.positions)
     middles = _points(mesh, edges.ends[marked], np.full((int(marked.sum()), 2), 0.5))
     corners, sides = mesh.triangles.astype(np.int64), edges.sides
@@ -103,7 +114,7 @@ def split(mesh: Mesh, edges: Edges, marked: Array) -> Mesh:
     pieces = [corners[count == 0]]
 
     def turned(which: Array, first: Array) -> tuple[Array, Array]:
-        """Corners and middles of the triangles, from side `first` on."""
+        """Returns the corners of the chosen triangles and the middles of their sides, in the order from side `first` on."""
         order = (first[:, None] + np.arange(3)) % 3
         rows = np.flatnonzero(which)[:, None]
         return corners[rows, order].T, number[sides[rows, order]].T
@@ -111,7 +122,7 @@ def split(mesh: Mesh, edges: Edges, marked: Array) -> Mesh:
     one, two, three = (count == n for n in (1, 2, 3))
     (a, b, c), (m, _, _) = turned(one, np.argmax(cut[one], axis=1))
     pieces += [np.stack(t, axis=1) for t in ((a, m, c), (m, b, c))]
-    # From the side that stays whole on: the corner opposite to it is cut off, and what is left has four corners.
+    # These triangles start at the side that is not cut. The corner opposite to it is cut off, which leaves a quad.
     (a, b, c), (_, m, k) = turned(two, np.argmin(cut[two], axis=1))
     pieces += [np.stack(t, axis=1) for t in ((c, k, m), (a, b, m), (a, m, k))]
     (a, b, c), (k, m, n) = turned(three, np.zeros(int(three.sum()), dtype=np.intp))
@@ -126,7 +137,11 @@ def split(mesh: Mesh, edges: Edges, marked: Array) -> Mesh:
 
 
 def _points(mesh: Mesh, corners: Array, weights: Array) -> Mesh:
-    """A mesh without triangles whose vertices lie between others: corners, weights (N, k)."""
+    """Returns a mesh without triangles. Each of its N vertices is a weighted mean of k vertices of the given mesh.
+
+    corners: (N, k) the vertices.
+    weights: (N, k) their weights, which sum to 1.
+    """
 
     def between(array: Array | None) -> Array | None:
         return None if array is None else np.einsum("nk,nkc->nc", weights, array[corners].astype(np.float64))

@@ -1,1 +1,1 @@
-"""Optics: float64 physics that several reflectance models share."""
+"""Optics: physical functions in float64 that several reflectance models share."""

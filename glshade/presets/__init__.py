@@ -1,6 +1,6 @@
-"""Presets: materials by name. A TOML file in this folder is one: a description, a source, and a material as in a scene file.
+"""Presets: materials that scenes use by name. Each is a TOML file of this folder, and the file's name is the preset's.
 
-The list of names is the folder's; a file is read when its preset is asked for, because start-up time is a feature.
+A file is read when its preset is first used, which keeps start-up fast.
 """
 
 from __future__ import annotations
@@ -19,7 +19,12 @@ from glshade.document import fault, nearest
 
 @dataclass(frozen=True)
 class Preset:
-    """description: what it looks like. source: where its figures are from. material: a table, as in a scene file."""
+    """A named material.
+
+    description: its look in one line.
+    source: the origin of its figures.
+    material: the material's table, as in a scene file.
+    """
 
     description: str
     source: str
@@ -55,12 +60,13 @@ PRESETS: Mapping[str, Preset] = _Presets(Path(__file__).parent)
 
 
 def preset(name: str) -> dict[str, Any]:
-    """The material table of a preset, which is the caller's to change. Errors: KeyError."""
+    """Returns a copy of the preset's material table, which the caller may change. Errors: KeyError."""
     return deepcopy(dict(PRESETS[name].material))
 
 
 class FromPreset:
-    """Annotates a material chosen by `brdf`: `preset = "gold"` stands for that preset's keys, where the table has no other."""
+    """Annotates the type of a material chosen by `brdf`, so that `preset = "gold"` in its table adds that preset's keys. Keys
+    that the table has itself take precedence."""
 
     def _expand(self, data: Any) -> Any:
         if not isinstance(data, Mapping) or "preset" not in data:
@@ -81,12 +87,12 @@ class FromPreset:
     def __get_pydantic_json_schema__(self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         described = handler(schema)
         for choice in described["anyOf"]:
-            # A definition is shared: what is added to it here holds wherever it is used.
+            # The definition is shared, so that a change here takes effect wherever it is used.
             table = handler.resolve_ref_schema(choice)
             brdf = table["properties"]["brdf"]["const"]
             names = [name for name in PRESETS if PRESETS[name].material["brdf"] == brdf]
             if names:
-                words = "the preset to start from, in place of a brdf; the keys beside it overrule its own"
+                words = "the preset to start from, in place of a brdf; keys of the table override the preset's"
                 table["properties"]["preset"] = {"enum": names, "description": words}
                 table["required"] = [key for key in table.get("required", ()) if key != "brdf"]
                 table["anyOf"] = [{"required": ["brdf"]}, {"required": ["preset"]}]

@@ -1,6 +1,8 @@
-"""pyrender: its scenes drawn by glshade. pyrender itself is not imported: its objects say what they are by their attributes.
+"""pyrender: a replacement for pyrender's OffscreenRenderer and a converter of its scenes, for programs that use pyrender.
 
 from glshade.pyrender import OffscreenRenderer  # in place of pyrender's
+
+pyrender itself is not imported: its objects are recognised by their attributes.
 """
 
 from glshade.pyrender.offscreen import OffscreenRenderer as OffscreenRenderer

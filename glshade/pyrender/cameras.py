@@ -1,4 +1,4 @@
-"""Cameras of pyrender, as cameras of glshade."""
+"""Cameras: converts pyrender's cameras into glshade's."""
 
 from __future__ import annotations
 
@@ -13,13 +13,17 @@ from glshade.errors import SceneError
 from glshade.scene.camera import Camera, Orthographic, Perspective, View
 
 Array = NDArray[np.float64]
-# How far the axes of a camera's pose may be from unit and perpendicular: float32 poses multiplied a few times.
+# The axes of a camera are unit and perpendicular. Their dot products may be wrong by this much, which is more than the error of
+# a product of several float32 poses.
 RIGID = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
 class OffCentre(View):
-    """A view whose axis meets the picture at `centre`: x to the right, y up, the picture from -1 to 1."""
+    """A view whose axis need not go through the middle of the picture.
+
+    centre: x, y of the point where the axis meets the picture. They go from -1 to 1 across the picture, x to the right, y up.
+    """
 
     centre: tuple[float, float] = (0.0, 0.0)
 
@@ -32,7 +36,11 @@ class OffCentre(View):
 
 
 class Pinhole(Perspective):
-    """A pinhole by its projection matrix: pixels need not be square, nor the axis in the middle of the picture."""
+    """A perspective camera whose pixels need not be square and whose axis need not go through the middle of the picture.
+
+    half: half the width and half the height of the picture at the distance 1.
+    centre: x, y of the point where the axis meets the picture, as in OffCentre.
+    """
 
     half: tuple[float, float]
     centre: tuple[float, float] = (0.0, 0.0)
@@ -45,26 +53,32 @@ class Pinhole(Perspective):
 
 
 def camera(given: Any, pose: Array, size: tuple[int, int]) -> Camera:
-    """The camera of a pyrender camera at its pose (4, 4), for a picture of `size`. Errors: SceneError."""
+    """Returns pyrender's camera as a camera of glshade.
+
+    given: a pyrender.Camera.
+    pose: (4, 4), from the camera's space to world space.
+    size: width, height of the picture [pixels].
+    Errors: SceneError where the pose is scaled or sheared.
+    """
     linear = pose[:3, :3]
     if not np.allclose(linear.T @ linear, np.eye(3), rtol=0, atol=RIGID):
-        raise SceneError("the camera's pose is scaled or sheared; a camera can be turned and moved")
-    where: dict[str, Any] = {"matrix": affine_rows(pose), "near": given.znear or None, "far": given.zfar, "name": given.name}
+        raise SceneError("the camera's pose is scaled or sheared; it may only rotate and move the camera")
+    common: dict[str, Any] = {"matrix": affine_rows(pose), "near": given.znear or None, "far": given.zfar, "name": given.name}
     width, height = size
     if hasattr(given, "xmag"):
-        # As in pyrender, xmag follows from ymag and the picture's shape.
-        return Orthographic.model_validate({**where, "height": 2 * given.ymag})
+        # pyrender ignores xmag and computes the width from ymag and the shape of the picture.
+        return Orthographic.model_validate({**common, "height": 2 * given.ymag})
     if hasattr(given, "fx"):
         half = (width / (2 * given.fx), height / (2 * given.fy))
         centre = (2 * given.cx / width - 1, 1 - 2 * given.cy / height)
-        return Pinhole.model_validate({**where, "half": half, "centre": centre})
+        return Pinhole.model_validate({**common, "half": half, "centre": centre})
     if given.aspectRatio is None:
-        return Perspective.model_validate({**where, "fov": math.degrees(given.yfov)})
+        return Perspective.model_validate({**common, "fov": math.degrees(given.yfov)})
     half_height = math.tan(given.yfov / 2)
-    return Pinhole.model_validate({**where, "half": (given.aspectRatio * half_height, half_height)})
+    return Pinhole.model_validate({**common, "half": (given.aspectRatio * half_height, half_height)})
 
 
 def affine_rows(matrix: Array) -> list[list[float]]:
-    """The rows of a (4, 4) matrix whose last may have rounding in it."""
+    """Returns the rows of an affine matrix (4, 4). The last row is replaced by 0, 0, 0, 1, in case it has rounding errors."""
     rows: list[list[float]] = np.asarray(matrix, dtype=np.float64).tolist()
     return [*rows[:3], [0.0, 0.0, 0.0, 1.0]]

@@ -1,4 +1,4 @@
-"""Materials of pyrender, as models of glshade: metallic-roughness is ggx."""
+"""Materials: converts pyrender's materials, which are of two kinds, into glshade's; both kinds become the model ggx."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from pydantic import ValidationError
 
 from glshade.brdfs import BRDFS, Brdf
 from glshade.errors import SceneError
-from glshade.mesh.formats import gltf_material
-from glshade.mesh.formats.file import File
+from glshade.mesh.reading import gltf_material
+from glshade.mesh.reading.file import MeshFile
 from glshade.pyrender.textures import picture, rgba
 
 Colour = tuple[float, float, float]
@@ -24,8 +24,15 @@ WHITE: Colour = (1.0, 1.0, 1.0)
 
 
 @dataclass(frozen=True)
-class Made:
-    """What was made of a material, with what it leaves out. state: of what it was made; held keeps that alive."""
+class ConvertedMaterial:
+    """A converted material in the cache.
+
+    brdf: the material.
+    notes: the warnings about parts of pyrender's material that the conversion leaves out.
+    state: the values that the material was converted from, as `_state` returns them.
+    held: the objects that the material was converted from. `state` contains their ids. As long as the objects are held, Python
+        does not reuse their ids.
+    """
 
     brdf: Brdf
     notes: tuple[str, ...]
@@ -33,27 +40,31 @@ class Made:
     held: tuple[Any, ...]
 
 
-_made: WeakKeyDictionary[Any, dict[tuple[bool, bool], Made]] = WeakKeyDictionary()
+# primitive -> (flat, both), as `material` takes them -> the converted material
+_cache: WeakKeyDictionary[Any, dict[tuple[bool, bool], ConvertedMaterial]] = WeakKeyDictionary()
 
 
 def material(primitive: Any, flat: bool, both: bool) -> tuple[Brdf, tuple[str, ...]]:
-    """The material of a primitive, and what is left out of it; the same object while nothing has changed.
+    """Returns (material, warnings) of a primitive. The material is the same object in each call until the primitive changes.
 
-    flat: base colours as they are, for ambient light of 1. both: back faces are drawn too. Errors: SceneError.
+    primitive: a pyrender.Primitive.
+    flat: True for a material that shows its base colour, without decoding it, under an ambient light of 1 and no other light.
+    both: True to draw back faces even where the material does not ask for it.
+    Errors: SceneError.
     """
-    kept = _made.setdefault(primitive, {})
+    cached = _cache.setdefault(primitive, {})
     held = tuple(_parts(primitive))
     state = tuple(map(_state, held))
-    known = kept.get((flat, both))
+    known = cached.get((flat, both))
     if known is None or known.state != state:
         notes: list[str] = []
         brdf = _material(primitive, flat, both, notes)
-        known = kept[flat, both] = Made(brdf, tuple(notes), state, held)
+        known = cached[flat, both] = ConvertedMaterial(brdf, tuple(notes), state, held)
     return known.brdf, known.notes
 
 
 def _parts(primitive: Any) -> Iterator[Any]:
-    """All that a material is made of."""
+    """Yields all objects that a primitive's material depends on."""
     yield primitive.color_0
     yield primitive.texcoord_0
     yield primitive.material
@@ -64,20 +75,28 @@ def _parts(primitive: Any) -> Iterator[Any]:
 
 
 def _state(value: Any) -> Any:
-    """Small arrays by what is in them, numbers and words as they are, all else by which object it is."""
+    """Returns a value that differs from the one before if the object has changed.
+
+    Numbers and texts compare by value, small arrays by their contents, and everything else by identity.
+    """
     if isinstance(value, np.ndarray) and value.size <= LARGEST_FACTOR:
         return value.tobytes()
     return value if isinstance(value, str | int | float | bool | None) else id(value)
 
 
-# What notes on materials begin with, as those of a file begin with its path.
+# The warnings of the glTF reader begin with a file name, and this text takes its place.
 ORIGIN = "pyrender"
-# Factors have up to 4 numbers, and may be changed in place.
+# Arrays of up to this many numbers are factors of a material. A program may change them in place.
 LARGEST_FACTOR = 4
 
 
 def silhouette(primitive: Any, colour: Colour, both: bool) -> Brdf:
-    """One colour, as it is; a cut-out keeps its holes."""
+    """Returns a material that shows one colour, without lighting, except in the holes of a cut-out.
+
+    primitive: a pyrender.Primitive.
+    colour: the colour, without decoding or encoding, from 0 to 1.
+    both: True to draw back faces even where the primitive's material does not ask for it.
+    """
     given = primitive.material
     glossy = hasattr(given, "diffuseFactor")
     texture = getattr(given, "diffuseTexture" if glossy else "baseColorTexture", None)
@@ -90,7 +109,7 @@ def silhouette(primitive: Any, colour: Colour, both: bool) -> Brdf:
     return _silhouette(colour, sides, alpha, float(given.alphaCutoff), path, wraps)
 
 
-# Segments are as many as there are nodes.
+# Cached, because validation is slow. A scene has as many segments as nodes, often thousands.
 @lru_cache(maxsize=4096)
 def _silhouette(
     colour: Colour,
@@ -100,30 +119,38 @@ def _silhouette(
     holes: Path | None = None,
     wraps: tuple[int, ...] = (),
 ) -> Brdf:
+    """Returns the material of a silhouette.
+
+    alpha: the factor of the alpha of a cut-out; None for a material that is no cut-out.
+    holes: the picture file with the alpha of a cut-out; None if it has no texture.
+    """
     keys: dict[str, Any] = {"brdf": "ambient", "ka": colour, "sides": sides}
     if holes is not None:
-        wrap = [gltf_material._WRAP.get(code, "repeat") for code in wraps]
+        wrap = [gltf_material.WRAP_MODES.get(code, "repeat") for code in wraps]
         keys["ka"] = {"texture": str(holes), "factor": colour, "wrap": wrap, "encoding": "linear"}
     if alpha is not None:
         keys |= {"alpha": alpha, "alpha_mode": "mask", "alpha_cutoff": cutoff}
     return BRDFS["ambient"].model_validate(keys)
 
 
-def _material(primitive: Any, flat: bool, both: bool, said: list[str]) -> Brdf:
-    """pyrender's materials are glTF's, key by key."""
+def _material(primitive: Any, flat: bool, both: bool, notes: list[str]) -> Brdf:
+    """Converts a primitive's material into a glTF material, which has the same keys, and that into glshade's.
+
+    notes: a list to which the warnings are added.
+    """
     given = primitive.material
     name = given.name or ""
     header: dict[str, list[Any]] = {"textures": [], "samplers": [], "images": []}
 
     def texture(slot: str) -> dict[str, Any] | None:
-        """glTF's textureInfo of one of the material's textures."""
-        found = getattr(given, slot, None)
-        path = picture(found) if found is not None and primitive.texcoord_0 is not None else None
-        if found is None or path is None:
+        """Returns glTF's textureInfo for a texture of the material; None if the texture or the coordinates are missing."""
+        source = getattr(given, slot, None)
+        path = picture(source) if source is not None and primitive.texcoord_0 is not None else None
+        if source is None or path is None:
             return None
         index = len(header["textures"])
         header["textures"].append({"source": index, "sampler": index})
-        header["samplers"].append({"wrapS": found.sampler.wrapS, "wrapT": found.sampler.wrapT})
+        header["samplers"].append({"wrapS": source.sampler.wrapS, "wrapT": source.sampler.wrapT})
         header["images"].append({"uri": quote(str(path))})
         return {"index": index}
 
@@ -131,34 +158,39 @@ def _material(primitive: Any, flat: bool, both: bool, said: list[str]) -> Brdf:
     glossy = hasattr(given, "diffuseFactor")
     base, picture_of = ("diffuseFactor", "diffuseTexture") if glossy else ("baseColorFactor", "baseColorTexture")
     factor = np.clip(np.asarray(getattr(given, base), dtype=np.float64), 0, 1)
-    if given.alphaMode == "BLEND" and not _seen_through(factor[3], getattr(given, picture_of), primitive):
-        # pyrender blends whatever it makes of a trimesh; what cannot be seen through is drawn as what it is.
+    if given.alphaMode == "BLEND" and not _is_transparent(factor[3], getattr(given, picture_of), primitive):
+        # pyrender marks every material that comes from trimesh as blended. Those without transparent parts are drawn as opaque.
         table["alphaMode"] = "OPAQUE"
     if flat or not glossy:
         info = {"baseColorFactor": factor.tolist(), "baseColorTexture": texture(picture_of)}
-        # The texture's first two channels, wherever they came from, as in pyrender's shader.
         packed = {} if flat else {"metallicRoughnessTexture": texture("metallicRoughnessTexture")}
         numbers = {} if flat else {"metallicFactor": given.metallicFactor, "roughnessFactor": given.roughnessFactor}
         table["pbrMetallicRoughness"] = {**info, **packed, **numbers}
     else:
         specular = np.clip(np.asarray(given.specularFactor, dtype=np.float64), 0, 1).tolist()
-        old: dict[str, Any] = {"diffuseFactor": factor.tolist(), "diffuseTexture": texture(picture_of)}
-        # The property calls itself without end in pyrender 0.1.45.
-        old |= {"specularFactor": specular, "glossinessFactor": given._glossinessFactor}
+        specular_glossiness: dict[str, Any] = {
+            "diffuseFactor": factor.tolist(),
+            "diffuseTexture": texture(picture_of),
+            "specularFactor": specular,
+            # In pyrender 0.1.45 the property `glossinessFactor` calls itself without end, so its private field is read instead.
+            "glossinessFactor": given._glossinessFactor,
+        }
         if given.specularGlossinessTexture is not None:
-            old["specularGlossinessTexture"] = {}
-        table["extensions"] = {"KHR_materials_pbrSpecularGlossiness": old}
+            # An empty entry makes the reader warn that the texture is not used.
+            specular_glossiness["specularGlossinessTexture"] = {}
+        table["extensions"] = {"KHR_materials_pbrSpecularGlossiness": specular_glossiness}
     if not flat:
+        # The reader warns that emission and occlusion are not used.
         table["emissiveFactor"] = np.asarray(given.emissiveFactor).tolist()
         normals = texture("normalTexture")
         table |= {"normalTexture": normals} if normals else {}
         if given.occlusionTexture is not None:
             table["occlusionTexture"] = {}
-    return _modelled(table, header, flat, both or given.doubleSided, said)
+    return _modelled(table, header, flat, both or given.doubleSided, notes)
 
 
-def _seen_through(alpha: float, texture: Any, primitive: Any) -> bool:
-    """Whether any of the surface lets light through."""
+def _is_transparent(alpha: float, texture: Any, primitive: Any) -> bool:
+    """Returns whether any part of the surface has an alpha below 1 by the material's factor, vertex colours or texture."""
     colours = primitive.color_0
     textured = texture is not None and texture.source is not None and primitive.texcoord_0 is not None
     return bool(
@@ -168,21 +200,22 @@ def _seen_through(alpha: float, texture: Any, primitive: Any) -> bool:
     )
 
 
-def _modelled(table: dict[str, Any], header: dict[str, Any], flat: bool, both: bool, said: list[str]) -> Brdf:
-    """The model of a glTF material. Errors: SceneError."""
-    notes = File(Path(ORIGIN), Path("/"), b"")
-    keys = gltf_material.material(notes, header, [], table)
+def _modelled(table: dict[str, Any], header: dict[str, Any], flat: bool, both: bool, notes: list[str]) -> Brdf:
+    """Converts a glTF material into glshade's. notes: a list to which the warnings are added. Errors: SceneError."""
+    file = MeshFile(Path(ORIGIN), Path("/"), b"")
+    keys = gltf_material.material(file, header, [], table)
     keys["sides"] = "both" if both else "front"
-    # Who shows them says where they are from.
-    said.extend(note.removeprefix(f"{ORIGIN}: ") for note in notes.contents.warnings)
+    # The callers add the prefix again when they give the warnings.
+    notes.extend(note.removeprefix(f"{ORIGIN}: ") for note in file.contents.warnings)
     if isinstance(keys.get("roughness"), dict):
-        # pyrender's shader reads roughness from red and metallic from green: it has put glTF's green and blue there.
+        # glTF stores roughness in green and metallicity in blue. pyrender uploads these two channels as red and green. Its
+        # shader reads red and green even from a texture whose channels were not moved.
         keys["roughness"]["channel"] = "r"
     if isinstance(keys.get("metallic"), dict):
         keys["metallic"]["channel"] = "g"
     if flat:
         base = keys["kd"]
-        # Unlit base colours are shown as they are, without decoding.
+        # pyrender shows unlit base colours without decoding them.
         base = {**base, "encoding": "linear"} if isinstance(base, dict) else base
         kept: set[str] = {"alpha", "alpha_mode", "alpha_cutoff", "sides"} & set(keys)
         keys = {"brdf": "ambient", "ka": base, **{name: keys[name] for name in kept}}

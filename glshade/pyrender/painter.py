@@ -1,4 +1,4 @@
-"""Painter: draws objects that were pyrender's, as pyrender does: in one pass, encoded as it is shown, depth included."""
+"""Painter: draws objects as pyrender does, in one pass that blends encoded colours and writes depth."""
 
 from __future__ import annotations
 
@@ -11,33 +11,42 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 
 from glshade.arrays import rounded
-from glshade.assembly.assembly import Assembly
 from glshade.errors import SceneError
-from glshade.gl.renderer import Draw, Prepared, Renderer
-from glshade.glsl.generator import PAGE
+from glshade.gl.preparation import DrawCall, Prepared
+from glshade.gl.renderer import Renderer
+from glshade.glsl.plan import PAGE
 from glshade.pyrender.canvas import Canvas
 from glshade.scene.camera import View
-from glshade.scene.scene import Film, Object, Scene
+from glshade.scene.film import Film
+from glshade.scene.object import Object
+from glshade.scene.scene import Scene
 
 if TYPE_CHECKING:
     from glshade.lights import Light
 
-# Scenes that stay at hand, ready to draw: one for each of a few flags, or a few in turn.
+# The number of prepared scenes in the cache: enough for one scene with several flags, or for several scenes in turn.
 KEPT_SCENES = 8
 
 
 @dataclass(eq=False)
 class Ready:
-    """A scene made ready to draw, the right way up."""
+    """A scene that is ready to draw.
 
-    scene: Scene
+    encoding: the encoding of the colours that the scene's programs write.
+    prepared: the scene, prepared by the renderer.
+    calls: the scene's draw calls, changed for a picture that is drawn the right way up.
+    """
+
     encoding: str
-    assembly: Assembly
-    draws: list[Draw]
+    prepared: Prepared
+    calls: list[DrawCall]
 
 
 class Painter:
-    """Keeps what it has made ready and what it draws into for the next picture."""
+    """Draws objects, and caches prepared scenes and framebuffers for the next picture.
+
+    renderer: the Renderer whose context and programs are used.
+    """
 
     def __init__(self, renderer: Renderer) -> None:
         self.renderer = renderer
@@ -53,66 +62,82 @@ class Painter:
         canvas: Canvas,
         encoding: Literal["power", "linear"],
     ) -> tuple[View, float]:
-        """Draws into a canvas that has begun; wires: the numbers of the objects that are drawn as wireframes.
+        """Draws objects into a canvas and returns (view, the length of the view's unit [scene units]).
 
-        The view, and what its lengths are to be multiplied by. The renderer's context is current. Errors: SceneError.
+        The renderer's context has to be current, and the canvas bound by `begin`.
+
+        objects: glshade's objects to draw, in drawing order.
+        wires: the numbers of the objects that are drawn as wireframes.
+        lights: glshade's lights that fall on the objects.
+        camera: glshade's camera that sees the objects.
+        canvas: the framebuffer to draw into.
+        encoding: "power" encodes colours with a power of 1 / 2.2 as pyrender does, "linear" leaves them as they are.
+        Errors: SceneError.
         """
-        ready = self._made_ready(objects, lights, camera, canvas.size, encoding)
-        view = ready.assembly.view
+        ready = self._prepared(objects, lights, camera, canvas.size, encoding)
+        view = ready.prepared.assembly.view
         clip = rounded(view.clip_from_world(self.renderer.context.zero_to_one) * UPRIGHT)
         gl = self.renderer.context.gl
 
-        def draw(draws: Iterable[Draw]) -> None:
-            for as_wires, some in groupby(draws, lambda one: one.instance.number in wires):
+        def draw(calls: Iterable[DrawCall]) -> None:
+            for as_wires, group in groupby(calls, lambda call: call.instance.number in wires):
                 gl.wireframe = as_wires
-                self.renderer._draw_all(Prepared(ready.scene, ready.assembly, list(some)), clip)
+                self.renderer.draw(ready.prepared, clip, group)
             gl.wireframe = False
 
-        draw(ready.draws)
-        # What can be seen through counts as solid in the depth.
-        blended = [one for one in ready.draws if one.plan.alpha == "blend"]
+        draw(ready.calls)
+        # pyrender writes the depth of blended surfaces, but glshade does not. So these surfaces are drawn a second time, as
+        # opaque ones and only into the depth.
+        blended = [call for call in ready.calls if call.plan.alpha == "blend"]
         if blended:
             with canvas.without_colours():
-                draw(replace(one, plan=replace(one.plan, alpha="opaque")) for one in blended)
-        # Scenes of extreme size are drawn in another unit of length.
+                draw(replace(call, plan=replace(call.plan, alpha="opaque")) for call in blended)
+        # The ratio of the near planes is the length of the view's unit: the renderer changes the unit for scenes of extreme
+        # size.
         return view, camera.near / view.near if camera.near else 1.0
 
     def canvas(self, size: tuple[int, int], samples: int, coloured: bool) -> Canvas:
-        """The canvas of that many samples a pixel. Errors: GlshadeError where it is too large."""
-        found = self._canvases.get((samples, coloured))
-        if found is None or found.size != size:
-            # Not released: what is forgotten is collected, and moderngl stumbles over what is both.
-            found = self._canvases[samples, coloured] = Canvas(self.renderer.context, size, samples, coloured)
-        return found
+        """Returns a canvas, the cached one if it has the right size. Errors: GlshadeError if the size is too large.
 
-    def _made_ready(
+        size: width, height [pixels].
+        samples, coloured: as for Canvas.
+        """
+        canvas = self._canvases.get((samples, coloured))
+        if canvas is None or canvas.size != size:
+            # Do not release the old canvas: gc() frees it once the last reference goes, and moderngl fails if both happen.
+            canvas = self._canvases[samples, coloured] = Canvas(self.renderer.context, size, samples, coloured)
+        return canvas
+
+    def _prepared(
         self, objects: list[Object], lights: tuple[Light, ...], camera: Any, size: tuple[int, int], encoding: str
     ) -> Ready:
-        """The scene of these objects, ready to draw: the same as before where nothing has changed."""
+        """Returns the scene of these objects, ready to draw. It comes from the cache if none of its parts has changed."""
         for index, known in enumerate(self._ready):
-            scene = known.scene
+            scene = known.prepared.scene
             same = len(scene.objects) == len(objects) and all(map(operator.is_, scene.objects, objects))
             if same and (scene.lights, scene.camera, scene.film.size, known.encoding) == (lights, camera, size, encoding):
                 self._ready.append(self._ready.pop(index))
                 return known
-        # Every part has been validated: for many objects, once more is as long as drawing them.
+        # model_construct skips validation: all parts are valid, and validating many objects takes as long as drawing them.
         scene = Scene.model_construct(objects=tuple(objects), lights=lights, camera=camera, film=Film(size=size))
-        # "power" is none of a film's encodings, and all the same to the renderer.
-        shown: Any = encoding
-        prepared = self.renderer._prepare(scene, None, shown)
-        if any(draw.added for draw in prepared.draws):
+        # The renderer accepts "power" too, but a film has no such encoding, so its type does not name it.
+        any_encoding: Any = encoding
+        prepared = self.renderer.prepare(scene, None, any_encoding)
+        if any(call.added for call in prepared.calls):
             raise SceneError(f"more than {PAGE} lights of a kind: glshade.render(glshade.from_pyrender(scene)) draws them")
-        made = Ready(scene, encoding, prepared.assembly, list(map(_upright, prepared.draws)))
-        self._ready = [*self._ready[1 - KEPT_SCENES :], made]
-        return made
+        ready = Ready(encoding, prepared, list(map(_upright, prepared.calls)))
+        self._ready = [*self._ready[1 - KEPT_SCENES :], ready]
+        return ready
 
 
-# glshade draws pictures upside down, so that row 0 is the top; the samples of a pixel then lie otherwise than in pyrender.
+# A factor of clip-space coordinates that turns pictures the right way up. glshade draws its own pictures upside down, so that
+# row 0 of an array is the top. In a picture drawn upside down, the samples of a pixel would be at other places than in
+# pyrender.
 UPRIGHT = np.array([[1.0], [-1.0], [1.0], [1.0]])
 
 
-def _upright(draw: Draw) -> Draw:
-    """The draw with its front faces the other way round."""
-    instance = replace(draw.instance)
-    vars(instance)["mirrored"] = not draw.instance.mirrored
-    return replace(draw, instance=instance)
+def _upright(call: DrawCall) -> DrawCall:
+    """Returns the draw call with the opposite winding of front faces, which turning the picture reverses."""
+    instance = replace(call.instance)
+    vars(instance)["mirrored"] = not call.instance.mirrored
+    return replace(call, instance=instance)

@@ -1,4 +1,4 @@
-"""Scenes of pyrender, as scenes of glshade."""
+"""Scene: converts pyrender's scenes into glshade's: their objects, materials, lights and main camera."""
 
 from __future__ import annotations
 
@@ -21,62 +21,84 @@ from glshade.mesh.file import AssetWarning
 from glshade.mesh.mesh import Mesh
 from glshade.pyrender.cameras import affine_rows, camera
 from glshade.pyrender.materials import WHITE, Colour, material, silhouette
-from glshade.pyrender.meshes import Screen, arrays, is_drawn_with_strokes, mesh, strokes
+from glshade.pyrender.meshes import Viewport, arrays, is_drawn_with_strokes, mesh, strokes
 from glshade.scene.camera import Perspective, is_singular
-from glshade.scene.scene import Film, Object, Scene, Transform
+from glshade.scene.film import Film
+from glshade.scene.object import Object, Transform
+from glshade.scene.scene import Scene
 
 Array = NDArray[np.float64]
 
-# pyrender has no distance below which a light grows no brighter; less than this, nothing is [m].
+# The distance below which a light grows no brighter [m]. It is tiny, because pyrender has no such limit.
 R_MIN = 1e-9
-# The lights under which surfaces show their base colours.
+# The lights for flat and silhouette materials. Under these lights the materials show exactly their colours.
 AS_THEY_ARE: tuple[Light, ...] = (LIGHTS["ambient"](type="ambient"),)
 
 
 def from_pyrender(scene: Any, size: tuple[int, int] = (640, 480)) -> Scene:
-    """The Scene of a pyrender.Scene, for a picture of `size` (width, height), 4 samples a pixel as there.
+    """Returns the Scene of a pyrender.Scene, with 4 samples a pixel as in pyrender's pictures.
 
-    Meshes with their instances, materials, textures, lights, the main camera (without one, the scene is framed) and the
-    background. Points and lines become strips a pixel wide as that camera sees them. What has no counterpart is left out with
-    an AssetWarning. Errors: SceneError, where nothing is left to draw too.
+    It has the meshes with their instances, materials and textures, the lights, the main camera and the background. If there is
+    no camera, a default one is chosen that shows the whole scene. Points become squares and lines become strips, a pixel wide
+    as seen by the main camera. AssetWarnings list everything that has no counterpart in glshade and is left out.
+
+    scene: a pyrender.Scene.
+    size: width, height of the picture [pixels].
+    Errors: SceneError, also where nothing is left to draw.
     """
-    seen_from = main_camera(scene, size)
-    seen_on = None if seen_from is None else lambda: screen(seen_from, size)
-    found = Conversion().convert(scene, scene.mesh_nodes, Look(), seen_on)
-    for note in found.notes + ["wireframes are drawn solid"] * bool(found.wires):
+    main = main_camera(scene, size)
+    viewport = None if main is None else lambda: screen(main, size)
+    converted = Conversion().convert(scene, scene.mesh_nodes, Look(), viewport)
+    if converted.wires:
+        converted.warn("wireframes are drawn solid")
+    for note in converted.notes:
         warnings.warn(f"pyrender: {note}", AssetWarning, stacklevel=2)
-    if not found.objects:
+    if not converted.objects:
         raise SceneError("the scene has nothing to draw")
-    background = np.asarray(scene.bg_color, dtype=np.float64)
-    # What pyrender clears with is shown as it is.
-    shown = [float(c) for c in srgb_to_linear(background[:3])] + [float(background[3])] * bool(background[3] < 1)
-    objects, materials = _named(found)
+    given = np.asarray(scene.bg_color, dtype=np.float64)
+    # pyrender's background colour is display-encoded.
+    background = tuple(float(c) for c in srgb_to_linear(given[:3]))
+    if given[3] < 1:
+        background = (*background, float(given[3]))
+    objects, materials = _named(converted)
     return Scene(
         objects=objects,
         materials=materials,
         lights=lights(scene),
-        camera=seen_from or Perspective(),
-        film=Film(size=size, samples=4, background=tuple(shown)),
+        camera=main or Perspective(),
+        film=Film(size=size, samples=4, background=background),
     )
 
 
 def main_camera(scene: Any, size: tuple[int, int]) -> Any:
-    """The main camera, None where the scene has none. Errors: SceneError."""
+    """Returns the main camera of a pyrender.Scene as a camera of glshade; None if the scene has no main camera.
+
+    size: width, height of the picture [pixels].
+    Errors: SceneError.
+    """
     node = scene.main_camera_node
     return None if node is None else camera(node.camera, scene.get_pose(node), size)
 
 
-def screen(seen_from: Any, size: tuple[int, int], point_size: float = 1.0) -> Screen:
-    """What points and lines need to know of a camera's picture."""
-    # Where the far plane is matters to neither.
-    return Screen(seen_from.view(np.zeros((1, 3)), size[0] / size[1]), size, point_size)
+def screen(main: Any, size: tuple[int, int], point_size: float = 1.0) -> Viewport:
+    """Returns the picture in which points and lines have a width.
+
+    main: pyrender's main camera, converted to a camera of glshade.
+    size: width, height of the picture [pixels].
+    point_size: the side of the squares that points become [pixels].
+    """
+    # `view` fits the far plane to the points that it is given. Squares and strips do not depend on the far plane, so any point
+    # will do.
+    return Viewport(main.view(np.zeros((1, 3)), size[0] / size[1]), size, point_size)
 
 
 @dataclass(frozen=True)
 class Look:
-    """What is made of the materials. lit: themselves. flat: base colours as they are. silhouette: the colour of their node.
+    """The way in which materials are converted.
 
-    both: back faces are drawn too. colours: node -> colour, white where it says nothing.
+    kind: "lit" for the materials themselves, "flat" for their base colours, "silhouette" for one colour for each node.
+    both: True to draw back faces even where a material does not ask for it.
+    colours: node -> colour of its silhouette, from 0 to 1; the default is white.
     """
 
     kind: Literal["lit", "flat", "silhouette"] = "lit"
@@ -86,100 +108,115 @@ class Look:
 
 @dataclass(eq=False)
 class Converted:
-    """objects: one for every primitive in every instance. names: (its own, its material's) of each, empty where there is none.
-    wires: the numbers of those drawn as wireframes. notes: what was left out."""
+    """Converted nodes.
+
+    objects: the N objects, one for every instance of every primitive.
+    names: N pairs, the object's name and its material's name. A name is empty if pyrender's object has no name.
+    wires: the numbers of the objects that pyrender draws as wireframes.
+    notes: the warnings about everything that was left out, each once.
+    """
 
     objects: list[Object]
     names: list[tuple[str, str]]
     wires: set[int]
     notes: list[str]
 
-    def say(self, *notes: str) -> None:
-        """Each once."""
+    def warn(self, *notes: str) -> None:
+        """Adds warnings, except those that are in the list already."""
         self.notes.extend(note for note in notes if note not in self.notes)
 
 
 class Conversion:
-    """Makes objects of nodes; what has not changed since the last time is not made again, and is the same object."""
+    """Converts nodes into objects. For nodes that have not changed, it returns the same objects as in the last conversion."""
 
     def __init__(self) -> None:
-        # What was made, by what it was made of; that is kept with it, so that nothing else comes to have its number.
+        # (kind, both) of a Look -> the cache of meshes and objects of the last conversion. A key of this cache contains the ids
+        # of the sources. An entry is (sources, result): as long as the sources are held, Python does not reuse their ids.
         self._last: dict[tuple[str, bool], dict[tuple[Any, ...], tuple[Any, Any]]] = {}
 
-    def convert(self, scene: Any, nodes: Iterable[Any], look: Look, seen_on: Callable[[], Screen] | None) -> Converted:
-        """The nodes' visible meshes in pyrender's order, from far to near: of surfaces at one place the first is seen.
+    def convert(self, scene: Any, nodes: Iterable[Any], look: Look, make_viewport: Callable[[], Viewport] | None) -> Converted:
+        """Converts the visible meshes of nodes, in pyrender's drawing order.
 
-        seen_on: for points and lines, which are left out without. Errors: SceneError.
+        The order matters: pyrender draws from far to near, and of several surfaces at the same depth the first one drawn is
+        visible.
+
+        scene: the pyrender.Scene that the nodes belong to.
+        nodes: the nodes to convert.
+        look: the way in which materials are converted.
+        make_viewport: returns the picture in which points and lines have a width; None leaves them out with a warning.
+        Errors: SceneError.
         """
         eye = np.zeros(3) if scene.main_camera_node is None else scene.get_pose(scene.main_camera_node)[:3, 3]
         placed = [(node, scene.get_pose(node)) for node in nodes if node.mesh.is_visible]
         placed.sort(key=lambda pair: (-float(np.linalg.norm(pair[1][:3, 3] - eye)), pair[0].name or "", pair[1].tobytes()))
         result = Converted([], [], set(), [])
         last = self._last.get((look.kind, look.both), {})
-        now: dict[tuple[Any, ...], tuple[Any, Any]] = {}
+        current: dict[tuple[Any, ...], tuple[Any, Any]] = {}
 
-        def kept(made_of: Any, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-            now[key] = last.get(key) or now.get(key) or (made_of, make())
-            return now[key][1]
+        def cached(sources: Any, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
+            current[key] = last.get(key) or current.get(key) or (sources, make())
+            return current[key][1]
 
         coloured = look.kind != "silhouette"
-        on: Screen | None = None
+        viewport: Viewport | None = None
         for node, pose in placed:
             for primitive in node.mesh.primitives:
                 if coloured:
-                    made, notes = material(primitive, look.kind == "flat", look.both)
-                    result.say(*notes)
+                    brdf, notes = material(primitive, look.kind == "flat", look.both)
+                    result.warn(*notes)
                 else:
-                    made = silhouette(primitive, look.colours.get(node, WHITE), look.both)
-                given = arrays(primitive)
-                for place in _instances(primitive, pose):
+                    brdf = silhouette(primitive, look.colours.get(node, WHITE), look.both)
+                sources = arrays(primitive)
+                for world in _instances(primitive, pose):
                     if not is_drawn_with_strokes(primitive):
                         shape = mesh(primitive)
-                    elif seen_on is not None:
-                        on = on or seen_on()
-                        key = (*map(id, given), place.tobytes(), on.key)
-                        shape = kept(given, key, partial(strokes, primitive, place, on))
-                        place = np.eye(4)
+                    elif make_viewport is not None:
+                        viewport = viewport or make_viewport()
+                        key = (*map(id, sources), world.tobytes(), viewport.key)
+                        shape = cached(sources, key, partial(strokes, primitive, world, viewport))
+                        # The mesh of points and lines is in world space already.
+                        world = np.eye(4)
                     else:
                         shape = None
-                        result.say("points and lines are left out: they are as wide as pixels, and the scene has no camera")
+                        result.warn("points and lines are left out: they are as wide as pixels, and the scene has no camera")
                     if shape is None:
                         continue
-                    key = (id(shape), id(made), place.tobytes())
-                    found = kept((shape, made), key, partial(_object, shape, made, place, coloured))
-                    if found is not None:
+                    key = (id(shape), id(brdf), world.tobytes())
+                    item = cached((shape, brdf), key, partial(_object, shape, brdf, world, coloured))
+                    if item is not None:
                         if primitive.material.wireframe and coloured:
                             result.wires.add(len(result.objects))
-                        result.objects.append(found)
+                        result.objects.append(item)
                         result.names.append((node.name or node.mesh.name or "", primitive.material.name or ""))
-        self._last[look.kind, look.both] = now
+        self._last[look.kind, look.both] = current
         return result
 
 
 def _instances(primitive: Any, pose: Array) -> Iterator[Array]:
+    """Yields the pose (4, 4) of each instance of a primitive. pose: (4, 4), the pose of the primitive's node."""
     if primitive.poses is None:
         yield pose
     else:
         yield from (pose @ own for own in primitive.poses.astype(np.float64))
 
 
-def _object(shape: Mesh, made: Brdf, place: Array, coloured: bool) -> Object | None:
-    """None for what is flattened: it covers no pixel."""
-    if is_singular(place[:3, :3]):
+def _object(shape: Mesh, brdf: Brdf, pose: Array, coloured: bool) -> Object | None:
+    """Returns an object; None if its pose (4, 4) flattens it, because a flat object covers no pixel."""
+    if is_singular(pose[:3, :3]):
         return None
-    # All of it is known to be right: validating it again takes longer than all else here.
-    rows: Any = tuple(map(tuple, affine_rows(place)))
+    # model_construct skips validation: all parts are valid, and validating them again takes longer than the whole conversion.
+    rows: Any = tuple(map(tuple, affine_rows(pose)))
     transform = Transform.model_construct(matrix=rows)
-    return Object.model_construct(mesh=shape, transform=transform, material=made, vertex_colours=coloured)
+    return Object.model_construct(mesh=shape, transform=transform, material=brdf, vertex_colours=coloured)
 
 
-def _named(found: Converted) -> tuple[tuple[Object, ...], dict[str, Brdf]]:
-    """The objects under their names, and their materials."""
+def _named(converted: Converted) -> tuple[tuple[Object, ...], dict[str, Brdf]]:
+    """Returns (objects, materials by name). A name that several objects or materials have is followed by a number."""
     objects: list[Object] = []
     materials: dict[str, Brdf] = {}
     taken: set[str] = set()
     last: Counter[str] = Counter()
-    for item, (own, of_material) in zip(found.objects, found.names, strict=True):
+    for item, (own, of_material) in zip(converted.objects, converted.names, strict=True):
         names: dict[str, str] = {}
         if own:
             name = own
@@ -190,7 +227,8 @@ def _named(found: Converted) -> tuple[tuple[Object, ...], dict[str, Brdf]]:
             names["name"] = name
         if of_material and isinstance(item.material, Brdf):
             name, number = of_material, 0
-            # What is made of one material is the same, but for primitives with colours or without texture coordinates.
+            # Primitives of the same material have equal `item.material`, unless they differ in vertex colours or texture
+            # coordinates.
             while materials.setdefault(name, item.material) != item.material:
                 number += 1
                 name = f"{of_material}.{number}"
@@ -203,16 +241,21 @@ def _named(found: Converted) -> tuple[tuple[Object, ...], dict[str, Brdf]]:
 
 
 def lights(scene: Any) -> tuple[Light, ...]:
-    """All lights. E lux, or E candela, are an intensity of E / pi: that of a white Lambertian that faces the light."""
+    """Returns the lights of a pyrender.Scene.
+
+    An intensity of E lux or candela becomes E / pi, the radiance of a white Lambertian surface that faces the light.
+    """
     return tuple(LIGHTS[table["type"]].model_validate(table) for table in _lights(scene))
 
 
 def _lights(scene: Any) -> Iterator[dict[str, Any]]:
+    """Yields each light as a table of a scene file."""
     if np.any(scene.ambient_light):
         yield {"type": "ambient", "colour": _three(scene.ambient_light)}
 
     def ordered(nodes: Iterable[Any]) -> list[tuple[Any, Array]]:
-        # Sums are rounded in their order, and a set has none.
+        # pyrender keeps lights in sets, whose order varies from run to run. The lights are sorted, because the sum of their
+        # light is rounded differently in each order.
         placed = [(node.light, scene.get_pose(node)) for node in nodes]
         return sorted(placed, key=lambda pair: pair[1].tobytes())
 
@@ -225,10 +268,11 @@ def _lights(scene: Any) -> Iterator[dict[str, Any]]:
         yield {"type": "point", **common(light), "position": _three(pose[:3, 3]), "r_min": R_MIN}
     for light, pose in ordered(scene.spot_light_nodes):
         cone = {"inner": math.degrees(light.innerConeAngle), "outer": math.degrees(light.outerConeAngle)}
-        where = {"direction": _three(-pose[:3, 2]), "position": _three(pose[:3, 3]), "r_min": R_MIN}
-        yield {"type": "gltf_spot", **common(light), **where, **cone}
+        place = {"direction": _three(-pose[:3, 2]), "position": _three(pose[:3, 3]), "r_min": R_MIN}
+        yield {"type": "gltf_spot", **common(light), **place, **cone}
 
 
 def _three(values: Any) -> tuple[float, float, float]:
+    """Returns the first three numbers of an array."""
     x, y, z = (float(value) for value in values[:3])
     return x, y, z

@@ -1,4 +1,4 @@
-"""Textures of pyrender, as picture files: glshade's are files, pyrender's are arrays."""
+"""Textures: writes pyrender's textures, which are arrays, to picture files, because glshade reads its textures from files."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 from glshade.image.image import Image
 
 Bytes = NDArray[np.uint8]
-# What has been written of a texture: the array, and the file.
+# texture -> `white`, as `picture` takes it -> (the array that was written, its file)
 _written: WeakKeyDictionary[Any, dict[bool, tuple[Bytes, Path]]] = WeakKeyDictionary()
 
 
 def picture(texture: Any, white: bool = False) -> Path | None:
-    """A PNG file with the texture's bytes, which lasts as long as the process; None for a texture without a picture.
+    """Returns a PNG file with the texture's bytes; None for a texture without pixels. The file is deleted at process exit.
 
-    white: its alpha alone, on white.
+    texture: a pyrender.Texture.
+    white: True to make all colours white and keep only the alpha.
     """
     source = texture.source
     if source is None:
@@ -34,7 +35,8 @@ def picture(texture: Any, white: bool = False) -> Path | None:
     pixels = rgba(source)
     if white:
         pixels[..., :3] = 255
-    # Materials are copied deep in pyrender, and their textures with them: equal pictures are one file.
+    # Files are named after their contents, because pyrender copies materials together with their textures: equal copies then
+    # share one file.
     path = _folder() / f"{hashlib.sha256(repr(pixels.shape).encode() + pixels.tobytes()).hexdigest()}.png"
     if not path.exists():
         Image(pixels, "srgb").save(path)
@@ -43,17 +45,18 @@ def picture(texture: Any, white: bool = False) -> Path | None:
 
 
 def rgba(source: Any) -> Bytes:
-    """(H, W, 4): as GL fills up a texture with fewer channels: 0 for colours, 1 for alpha."""
-    given = np.asarray(source, dtype=np.uint8)
-    given = given.reshape(*given.shape[:2], -1)
-    result = np.zeros((*given.shape[:2], 4), dtype=np.uint8)
+    """Returns pixels (H, W, 4) from (H, W) or (H, W, C). As in OpenGL, missing colours are 0 and a missing alpha is 1."""
+    pixels = np.asarray(source, dtype=np.uint8)
+    pixels = pixels.reshape(*pixels.shape[:2], -1)
+    result = np.zeros((*pixels.shape[:2], 4), dtype=np.uint8)
     result[..., 3] = 255
-    result[..., : given.shape[2]] = given
+    result[..., : pixels.shape[2]] = pixels
     return result
 
 
 @cache
 def _folder() -> Path:
-    # Kept by the function's attribute: the folder goes with the object, at the end of the process.
+    """Returns the folder of the files; it is deleted when the process ends."""
+    # The folder is deleted together with its TemporaryDirectory object, so an attribute of this function keeps that alive.
     _folder.kept = tempfile.TemporaryDirectory(prefix="glshade-pyrender-")  # type: ignore[attr-defined]
     return Path(_folder.kept.name)  # type: ignore[attr-defined]

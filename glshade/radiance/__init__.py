@@ -1,1 +1,1 @@
-"""Radiance: float64 light at points of a surface."""
+"""Radiance: the light that points of a surface show to the viewer, computed in float64."""

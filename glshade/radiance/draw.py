@@ -1,4 +1,4 @@
-"""Draw: one instance as the GPU is given it, its float32 values widened to float64."""
+"""Draw: the inputs of one instance, with the float32 values of the GPU widened to float64."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.arrays import rounded
-from glshade.assembly.assembly import Assembly, Instance
+from glshade.assembly.assembly import Assembly
+from glshade.assembly.instance import Instance
 from glshade.assembly.values import ambient_intensity, direction, light_values, normal_matrix
 from glshade.brdfs import BRDFS, Brdf
 from glshade.lights import Falloff, Light
 from glshade.radiance.sampler import Sampler
 from glshade.scene.scene import Scene
-from glshade.textures.texels import Texels, texels
+from glshade.textures.texels import Texels, texels_of
 from glshade.textures.texture import CHANNELS, DirectionMap, Texture
 
 Array = NDArray[np.float64]
@@ -26,27 +27,45 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Lamp:
-    """A light as uploaded. values: its struct's fields, intensity with exposure and pi; positions relative to the eye."""
+    """A light with the values that are uploaded.
+
+    kind: the class of the light.
+    falloff: how its strength decreases with distance, as a key of FALLOFFS.
+    values: the fields of its GLSL struct, widened to float64. The intensity includes the exposure and, for a directed light,
+        the factor pi; positions are relative to the eye.
+    """
 
     kind: type[Light]
     falloff: Falloff
     values: dict[str, Array]
 
     def fields(self, dtype: Any) -> SimpleNamespace:
-        """The struct in another precision."""
+        """Returns the fields of the GLSL struct as attributes of an object, as arrays of the given NumPy type."""
         return SimpleNamespace(**{name: value.astype(dtype) for name, value in self.values.items()})
 
 
 @dataclass(frozen=True, eq=False)
 class Draw:
-    """One instance as the GPU is given it.
+    """The inputs of one instance, as the GPU is given them.
 
-    triangles (T, 3): vertex numbers in the order of drawing. world_from_object (4, 4): to positions relative to the eye.
-    normal_from_object (3, 3). clip_from_world (4, 4), y downward, depth reversed, z in [0, w]. viewer (3,): v of an
-    orthographic view, None in perspective. parameters: name -> (3,) or (), a texture's factor; samplers: their textures, by
-    the same names; channels: of those that are numbers, 0 to 3. normal_map: a bump map's normals too. directions: of tangents,
-    by a map; turn (2,): cos and sin of the angle by which they are turned. ambient (3,). alpha: what the base texture's and the
-    vertex colours' alpha multiply.
+    instance: the instance that is drawn.
+    triangles: vertex indices (T, 3), in the order of drawing.
+    world_from_object: transform (4, 4) from object space to positions relative to the eye.
+    normal_from_object: transform (3, 3) of normals.
+    clip_from_world: clip matrix (4, 4), with y pointing down, reversed depth, and z in [0, w].
+    viewer: unit direction to the viewer (3,) in an orthographic view; None in a perspective view.
+    lamps: the directed lights.
+    surrounds: the omnidirectional lights that depend on the normal.
+    ambient: sum (3,) of the intensities of those lights that are the same for every normal, multiplied by the exposure.
+    parameters: name -> value of the model's parameter, (3,) for a colour, () for a number; the factor of a textured parameter.
+    samplers: name -> texture of a textured parameter.
+    channels: name -> channel that holds a textured parameter, 0 to 3; colours ignore it.
+    normal_map: texture of normals, from a normal map or from a bump map; None without either.
+    normal_scale: factor of the map's x and y.
+    directions: texture of the directions of tangents; None without a direction map.
+    turn: cosine and sine (2,) of the angle by which tangents are turned.
+    alpha: the material's alpha, which the alpha of the base texture and of vertex colours multiplies.
+    alpha_cutoff: least alpha that is drawn, if the alpha mode is "mask".
     """
 
     instance: Instance
@@ -56,6 +75,7 @@ class Draw:
     clip_from_world: Array
     viewer: Array | None
     lamps: tuple[Lamp, ...]
+    surrounds: tuple[Lamp, ...]
     ambient: Array
     parameters: dict[str, Array]
     samplers: dict[str, Sampler]
@@ -74,68 +94,77 @@ class Draw:
 
     @property
     def alpha_mode(self) -> Literal["opaque", "mask", "blend"]:
-        """What alpha does."""
+        """The material's alpha mode."""
         return self.instance.material.alpha_mode
 
     @property
     def alpha_sampler(self) -> Sampler | None:
-        """The texture whose alpha counts: the surface's own colour's."""
+        """The texture of the base colour, whose alpha is used; None if the base colour has no texture."""
         return next((self.samplers.get(name) for name, p in self.model.parameters().items() if p.base), None)
 
     @property
     def tangents(self) -> bool:
-        """Whether the shading frame is turned by the mesh's tangents."""
+        """Whether the shading frame follows the mesh's tangents."""
         return self.model.anisotropic or self.normal_map is not None
 
     @property
     def pictures(self) -> list[Sampler]:
-        """All that is read at texture coordinates."""
-        return [*self.samplers.values(), *(s for s in (self.normal_map, self.directions) if s is not None)]
+        """All textures of the instance."""
+        maps = [sampler for sampler in (self.normal_map, self.directions) if sampler is not None]
+        return [*self.samplers.values(), *maps]
 
     @cached_property
     def clip(self) -> Array:
-        """(V, 4): the vertices in clip space."""
+        """The positions of the vertices in clip space (V, 4)."""
         world = self.instance.mesh.positions @ self.world_from_object[:3, :3].T + self.world_from_object[:3, 3]
         clip: Array = world @ self.clip_from_world[:, :3].T + self.clip_from_world[:, 3]
         return clip
 
 
 def draw_of(scene: Scene, assembly: Assembly, instance: Instance) -> Draw:
-    """One instance as the GPU would be given it. Errors: AssetError."""
+    """Returns the inputs of one instance, with the clip matrix of the whole picture. Errors: AssetError."""
     clip = wide(assembly.view.clip_from_world(zero_to_one=True))
     return placed(scene, assembly, instance, clip, {})
 
 
 def wide(value: Any) -> Array:
-    """float64 of what is uploaded as float32."""
+    """Returns a value rounded to float32, as for the upload, and widened to float64 again."""
     return rounded(value).astype(np.float64)
 
 
 def placed(scene: Scene, assembly: Assembly, instance: Instance, clip: Array, samplers: dict[Texels, Sampler]) -> Draw:
-    """One instance under a clip matrix (4, 4). samplers: those read so far, which grow. Errors: AssetError."""
+    """Returns the inputs of one instance.
+
+    clip: clip matrix (4, 4), as in `Draw.clip_from_world`.
+    samplers: textures that have been read already; the textures that are read here are added.
+    Errors: AssetError.
+    """
     view, material = assembly.view, instance.material
     world_from_object = instance.world_from_object.copy()
     world_from_object[:3, 3] -= view.eye
     parameters, textures, channels = {}, {}, {}
     for name, declared in type(material).parameters().items():
-        value, place = getattr(material, name), name
+        value, key = getattr(material, name), name
         if value is None and declared.same_as is not None:
-            place = declared.same_as
-            value = getattr(material, place)
+            key = declared.same_as
+            value = getattr(material, key)
         if isinstance(value, Texture):
-            textures[name] = _sampler(texels(material, place), samplers)
+            textures[name] = _sampler(texels_of(material, key), samplers)
             channels[name] = CHANNELS.index(value.channel or CHANNELS[0])
             value = value.factor if type(material).is_colour(name) else value.factor[0]
         parameters[name] = wide(value)
     chosen = [assembly.lights[i] for i in instance.lights]
-    lamps = []
+    lamps: list[Lamp] = []
+    surrounds: list[Lamp] = []
     for light in chosen:
-        if not light.omnidirectional:
+        if not light.ignores_normal:
             uploaded = light_values(light, view.eye, scene.film.exposure)
             values = {name: value.astype(np.float64) for name, value in uploaded.items()}
-            lamps.append(Lamp(type(light), getattr(light, "falloff", "none"), values))
+            lamp = Lamp(type(light), getattr(light, "falloff", "none"), values)
+            (surrounds if light.omnidirectional else lamps).append(lamp)
     triangles = instance.mesh.triangles.astype(np.intp)
     if material.alpha_mode == "blend":
+        # Blended triangles are drawn back to front.
         centroids = instance.mesh.positions[triangles].mean(axis=1, dtype=np.float64)
         world = centroids @ instance.world_from_object[:3, :3].T + instance.world_from_object[:3, 3]
         triangles = triangles[np.argsort(-view.depth(world), kind="stable")]
@@ -151,20 +180,22 @@ def placed(scene: Scene, assembly: Assembly, instance: Instance, clip: Array, sa
         clip_from_world=clip,
         viewer=None if view.perspective else wide(view.toward_viewer),
         lamps=tuple(lamps),
+        surrounds=tuple(surrounds),
         ambient=wide(ambient_intensity(assembly, instance.lights, scene.film.exposure)),
         parameters=parameters,
         samplers=textures,
         channels=channels,
-        normal_map=_sampler(texels(material, bumps), samplers) if bumps else None,
+        normal_map=_sampler(texels_of(material, bumps), samplers) if bumps else None,
         normal_scale=float(rounded(scale)),
-        directions=_sampler(texels(material, "tangent_direction"), samplers) if by_map else None,
+        directions=_sampler(texels_of(material, "tangent_direction"), samplers) if by_map else None,
         turn=wide(direction(material)),
         alpha=float(rounded(material.alpha)),
         alpha_cutoff=float(rounded(material.alpha_cutoff)),
     )
 
 
-def _sampler(given: Texels, kept: dict[Texels, Sampler]) -> Sampler:
-    if given not in kept:
-        kept[given] = Sampler.load(given)
-    return kept[given]
+def _sampler(texels: Texels, samplers: dict[Texels, Sampler]) -> Sampler:
+    """Returns the texture of the texels, which is read once and then kept in `samplers`. Errors: AssetError."""
+    if texels not in samplers:
+        samplers[texels] = Sampler.load(texels)
+    return samplers[texels]

@@ -1,15 +1,18 @@
-"""Readying: a scene assembled, its meshes refined where their light asks for it, and reduced to the part that is shown."""
+"""Readying: the steps from a scene to the assembly that is drawn: assemble it, refine its meshes, and select a part of it."""
 
 from __future__ import annotations
 
 from glshade.assembly.assembly import Assembly, assemble
 from glshade.assembly.part import Part
-from glshade.scene.scene import Rate, Scene
+from glshade.scene.object import Rate
+from glshade.scene.scene import Scene
 
 
 def ready(scene: Scene, shading: Rate | None = None, part: Part | None = None) -> Assembly:
-    """The assembly that both renderers draw. shading: overrules every object's. part: what of the scene is shown.
+    """Returns the assembly that both renderers draw.
 
+    shading: optional, the shading rate of all objects in place of their own.
+    part: optional, the part of the scene that is shown in place of all its light.
     Errors: SceneError (AssetError).
     """
     assembly = assemble(scene, shading)

@@ -1,4 +1,4 @@
-"""Texturing: pictures read at texture coordinates, trilinear. OpenGL 4.6 core, 8.14."""
+"""Sampler: textures that are read with trilinear filtering, as in section 8.14 of the OpenGL 4.6 core specification."""
 
 from __future__ import annotations
 
@@ -17,8 +17,15 @@ Array = NDArray[Any]
 
 @dataclass(frozen=True, eq=False)
 class Sampler:
-    """A mip chain in one piece. texels (sum of H W, 4) float32; starts, widths, heights (L,): of the levels in it. span: how
-    often the unit of texture coordinates goes into the texels, along u and v."""
+    """A texture with its L mipmap levels in one array.
+
+    texels: the texels of all levels (N, 4) float32, one level after the other, each from its bottom row to its top row.
+    starts: index of each level's first texel (L,).
+    widths: width of each level (L,) [texels].
+    heights: height of each level (L,) [texels].
+    wrap: wrap modes along u and along v.
+    span: how many units of texture coordinates a level spans, along u and along v.
+    """
 
     texels: NDArray[np.float32]
     starts: NDArray[np.intp]
@@ -29,12 +36,12 @@ class Sampler:
 
     @classmethod
     def load(cls, given: Texels) -> Sampler:
-        """What is uploaded. Errors: AssetError."""
+        """Returns the texture of a picture file. Errors: AssetError."""
         return cls._of(given.read(), given.wrap, given.span)
 
     @classmethod
     def of(cls, pixels: NDArray[np.float32], wrap: tuple[WrapMode, WrapMode]) -> Sampler:
-        """A picture (H, W, 4), row 0 at the top; v = 0 is its bottom."""
+        """Returns the texture of a picture (H, W, 4) whose row 0 is the top row. v = 0 is the bottom of the picture."""
         return cls._of(np.ascontiguousarray(pixels[::-1]), wrap, (1, 1))
 
     @classmethod
@@ -46,20 +53,28 @@ class Sampler:
 
     @property
     def size(self) -> NDArray[np.float64]:
-        """(2,): texels of the largest level to a unit of texture coordinates, u and v."""
+        """The number of texels of the largest level in one unit of texture coordinates, along u and along v (2,)."""
         result: NDArray[np.float64] = np.array([self.widths[0], self.heights[0]]) / np.array(self.span)
         return result
 
     def level(self, dx: Array, dy: Array) -> Array:
-        """lambda (N,): the level of detail where uv changes by dx and dy (N, 2) from pixel to pixel; eqs. 8.8 and 8.10."""
+        """Returns the level of detail (N,) of pixels; OpenGL 4.6, equations 8.8 and 8.10.
+
+        dx: change of the texture coordinates from a pixel to the next one in its row (N, 2).
+        dy: change of the texture coordinates from a pixel to the next one in its column (N, 2).
+        """
         size = self.size.astype(dx.dtype)
         longest = np.maximum(np.linalg.norm(dx * size, axis=1), np.linalg.norm(dy * size, axis=1))
-        # 1e-30 texels a pixel: far below level 0, and the logarithm stays finite.
+        # A least change of 1e-30 texels per pixel keeps the logarithm finite. It is far below level 0.
         result: Array = np.log2(np.maximum(longest, 1e-30))
         return result
 
     def sample(self, uv: Array, level: Array | None = None) -> Array:
-        """(N, 4) at uv (N, 2), at the levels of detail (N,); without, as in the vertex stage, at level 0."""
+        """Returns the filtered values (N, 4) of the texture.
+
+        uv: texture coordinates (N, 2).
+        level: optional, levels of detail (N,); without them, level 0 is read, as in the vertex stage.
+        """
         base = np.zeros(len(uv), dtype=np.intp)
         if level is None:
             return self._bilinear(uv, base)
@@ -74,6 +89,7 @@ class Sampler:
         return result
 
     def _bilinear(self, uv: Array, level: NDArray[np.intp]) -> Array:
+        """Returns the bilinearly filtered values (N, 4) at texture coordinates (N, 2), each from one mipmap level (N,)."""
         start, width, height = self.starts[level], self.widths[level], self.heights[level]
         u, v = uv[:, 0] / self.span[0] * width - 0.5, uv[:, 1] / self.span[1] * height - 0.5
         left, below = np.floor(u), np.floor(v)
@@ -89,13 +105,13 @@ class Sampler:
 
 
 def _wrapped(index: NDArray[np.intp], size: NDArray[np.intp], mode: WrapMode) -> NDArray[np.intp]:
-    """Texel numbers within [0, size): table 8.20."""
+    """Returns the indices of texels brought into [0, size) by a wrap mode; OpenGL 4.6, table 8.20."""
     if mode == "clamp":
         return np.clip(index, 0, size - 1)
     if mode == "repeat":
         wrapped: NDArray[np.intp] = index % size
         return wrapped
-    # There and back again: the second half of a period of 2 size runs backward.
+    # The indices have a period of 2 size, whose second half runs backward.
     index = index % (2 * size)
-    there_and_back: NDArray[np.intp] = np.minimum(index, 2 * size - 1 - index)
-    return there_and_back
+    mirrored: NDArray[np.intp] = np.minimum(index, 2 * size - 1 - index)
+    return mirrored

@@ -1,4 +1,4 @@
-"""Surface: points of an instance, and the light that they show to the viewer."""
+"""Surface: points of an instance's surface, and the light that they show to the viewer."""
 
 from __future__ import annotations
 
@@ -9,26 +9,31 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.lights import FALLOFFS
 from glshade.radiance.draw import Draw
 from glshade.radiance.sampler import Sampler
 
 Array = NDArray[Any]
 
-# As in the shaders: how far above the horizon of n lies the plane at which the viewer is mirrored.
+# The least cosine between the normal and the direction to the viewer. A direction with a smaller cosine is mirrored upward, as
+# in shaders/surface/horizon.glsl.
 HORIZON = 1e-3
-
-
-# ... and how long the direction of a map has to be.
+# A vector of a direction map counts as no direction if its length is at most this, as in shaders/surface/direction_map.glsl.
 NO_DIRECTION = 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Points of a surface, in world space relative to the eye.
+    """N points of a surface, in world space relative to the eye.
 
-    position, normal (N, 3), tangent (N, 4), uv (N, 2), colour (N, 4). The normal as interpolated, of any length. side (N,): -1
-    turns the normal over. footprint: change of uv from pixel to pixel, across and down; None in the vertex stage. level: added
-    to the textures' level of detail, a number or (N,).
+    side: 1, or -1 where the normal has to be reversed (N,).
+    position: positions (N, 3) [scene units].
+    normal: normals as they were interpolated, of any length (N, 3).
+    tangent: tangents, and in the last column the sign of the bitangent (N, 4); None where they are not needed.
+    uv: texture coordinates (N, 2); None for a mesh without them.
+    colour: vertex colours, linear Rec. 709, and alpha (N, 4); None where they are not used.
+    footprint: changes of uv from a pixel to the next one in its row and in its column, (N, 2) each; None in the vertex stage.
+    level: number, or array (N,), that is added to the textures' level of detail.
     """
 
     side: Array
@@ -42,7 +47,12 @@ class Surface:
 
 
 def at_vertices(draw: Draw, which: NDArray[np.intp], dtype: Any, centroids: bool = False) -> Surface:
-    """The surface at vertices, or at the centroids that they carry."""
+    """Returns the surface at vertices.
+
+    which: indices of the vertices (N,).
+    dtype: NumPy type of the result.
+    centroids: whether the points are the centroids of faces, which are stored with the vertices of faceted meshes.
+    """
     mesh = draw.instance.mesh
     place = mesh.centroids if centroids and mesh.centroids is not None else mesh.positions
     linear = draw.world_from_object[:3, :3].astype(dtype)
@@ -55,7 +65,7 @@ def at_vertices(draw: Draw, which: NDArray[np.intp], dtype: Any, centroids: bool
     if draw.tangents and mesh.tangents is not None:
         along = mesh.tangents[which].astype(dtype)
         turned = _unit(along[:, :3] @ linear.T)
-        # A mirror turns right-handed frames into left-handed ones.
+        # A transform that mirrors turns right-handed frames into left-handed ones.
         hand = -along[:, 3:] if draw.instance.mirrored else along[:, 3:]
         tangent = np.concatenate([turned, hand], axis=1)
     uvs, colours = (mesh.centroid_uvs, mesh.centroid_colours) if centroids else (mesh.uvs, mesh.colours)
@@ -65,6 +75,7 @@ def at_vertices(draw: Draw, which: NDArray[np.intp], dtype: Any, centroids: bool
 
 
 def _sampled(sampler: Sampler, surface: Surface) -> Array:
+    """Returns the values (N, 4) of a texture at the points."""
     if surface.uv is None:
         raise ValueError("a texture needs texture coordinates")
     if surface.footprint is None:
@@ -73,6 +84,7 @@ def _sampled(sampler: Sampler, surface: Surface) -> Array:
 
 
 def alpha_of(draw: Draw, surface: Surface) -> Array:
+    """Returns the alpha of the points (N,)."""
     value = np.full(len(surface.position), draw.alpha, dtype=surface.position.dtype)
     if draw.alpha_sampler is not None:
         value = value * _sampled(draw.alpha_sampler, surface)[:, 3]
@@ -82,32 +94,33 @@ def alpha_of(draw: Draw, surface: Surface) -> Array:
 
 
 def material_of(draw: Draw, surface: Surface) -> SimpleNamespace:
-    """The model's parameters at the points: colours (N, 3) or (3,), scalars (N,) or ()."""
-    found: dict[str, Array] = {}
+    """Returns the model's parameters at the points: colours (N, 3) or (3,), numbers (N,) or ()."""
+    values: dict[str, Array] = {}
     for name, declared in draw.model.parameters().items():
         value = draw.parameters[name].astype(surface.position.dtype)
         colour = draw.model.is_colour(name)
         if name in draw.samplers:
             texel = _sampled(draw.samplers[name], surface)
             value = value * (texel[:, :3] if colour else texel[:, draw.channels[name]])
-            # A texel beyond what a parameter may be counts as the nearest that it may.
+            # A texel outside of the parameter's range is clamped to it.
             value = np.clip(value, value.dtype.type(declared.low), declared.high and value.dtype.type(declared.high))
-        # A parameter that equals the surface's own colour equals it with its vertex colours.
+        # Vertex colours multiply the base colour, and a parameter that equals the base colour because it was left out.
         tinted = declared.base or _stands_for_base(draw, name)
         if tinted and surface.colour is not None:
             value = value * surface.colour[:, :3]
-        found[name] = value
-    return SimpleNamespace(**found, **draw.instance.material.chosen())
+        values[name] = value
+    return SimpleNamespace(**values, **draw.instance.material.chosen())
 
 
 def _stands_for_base(draw: Draw, name: str) -> bool:
+    """Whether a parameter was left out and takes the value of the base colour."""
     declared = draw.model.parameters()
     same_as = declared[name].same_as
     return same_as is not None and declared[same_as].base and getattr(draw.instance.material, name) is None
 
 
 def _frame(draw: Draw, surface: Surface) -> tuple[Array, Array, Array]:
-    """(t, b, n), each (N, 3): unit and perpendicular, n on the side that is seen."""
+    """Returns the shading frame (t, b, n), (N, 3) each: unit, perpendicular, and with n on the side that is seen."""
     n = _unit(surface.normal)
     side = surface.side[:, None]
     if surface.tangent is None:
@@ -128,36 +141,46 @@ def _frame(draw: Draw, surface: Surface) -> tuple[Array, Array, Array]:
 
 
 def _turned(t: Array, b: Array, direction: Array) -> tuple[Array, Array]:
-    """t, b (N, 3) turned about their normal; direction (N or 1, 2): cos and sin, from t toward b."""
+    """Returns t and b (N, 3) turned about their normal.
+
+    direction: cosine and sine of the angles from t toward b, (N, 2) or (1, 2).
+    """
     cos, sin = direction[:, :1], direction[:, 1:]
     return cos * t + sin * b, cos * b - sin * t
 
 
 def toward_viewer(draw: Draw, position: Array) -> Array:
-    """v (N, 3)."""
+    """Returns the unit directions v (N, 3) to the viewer, from positions (N, 3) relative to the eye."""
     if draw.viewer is None:
         return _unit(-position)
     return np.broadcast_to(draw.viewer.astype(position.dtype), position.shape)
 
 
-def shown(draw: Draw, surface: Surface, material: SimpleNamespace | None = None) -> Array:
-    """(N, 3): the sum over the lights of what the points show to the viewer. material: `material_of` them, if at hand."""
+def evaluate_surface(draw: Draw, surface: Surface, material: SimpleNamespace | None = None) -> Array:
+    """Returns the light (N, 3) that the points show to the viewer, linear Rec. 709, or the property that the instance shows.
+
+    material: optional, the result of `material_of` for the same points, where it is known already.
+    """
     dtype = surface.position.dtype
     if draw.instance.shows != "light":
-        return _place(draw, surface)
+        return _property(draw, surface)
     m = material or material_of(draw, surface)
     total = np.zeros((len(surface.position), 3), dtype=dtype)
     if draw.ambient.any():
         total += draw.ambient.astype(dtype) * draw.model.ambient_reflectance(m)
-    if not draw.lamps:
+    if not (draw.lamps or draw.surrounds):
         return total
     t, b, n = _frame(draw, surface)
+    for lamp in draw.surrounds:
+        total += lamp.kind.illuminate(lamp.fields(dtype), n) * draw.model.ambient_reflectance(m)
+    if not draw.lamps:
+        return total
 
     def local(direction: Array) -> Array:
         return np.stack([np.einsum("ij,ij->i", axis, direction) for axis in (t, b, n)], axis=1)
 
     v = toward_viewer(draw, surface.position)
-    # A pixel that is seen faces the viewer, whatever an average of its neighbours' normals says.
+    # A visible point faces the viewer, but its interpolated normal may not. So v is mirrored above the horizon.
     up = 2 * np.maximum(HORIZON - np.einsum("ij,ij->i", n, v), 0)[:, None]
     v = (v + up * n) / np.sqrt(1 + 2 * HORIZON * up)
     v_local = local(v)
@@ -166,13 +189,13 @@ def shown(draw: Draw, surface: Surface, material: SimpleNamespace | None = None)
         l, e = lamp.kind.illuminate(light, surface.position)
         if lamp.falloff != "none":
             r = np.maximum(np.linalg.norm(light.position - surface.position, axis=1), light.r_min)
-            e = e / (r if lamp.falloff == "1/r" else r * r)[:, None]
+            e = e / (r ** FALLOFFS[lamp.falloff].power)[:, None]
         total += e * draw.model.brdf_cos(m, local(l), v_local)
     return total
 
 
-def _place(draw: Draw, surface: Surface) -> Array:
-    """(N, 3): what an instance shows in place of light."""
+def _property(draw: Draw, surface: Surface) -> Array:
+    """Returns the property (N, 3) that the instance shows in place of light: its normal, uv, or depth and number."""
     if draw.instance.shows == "normal":
         return _frame(draw, surface)[2]
     result = np.zeros_like(surface.position)
@@ -185,7 +208,7 @@ def _place(draw: Draw, surface: Surface) -> Array:
 
 
 def _unit(x: Array) -> Array:
-    """x (..., 3) made unit; the zero vector stays."""
+    """Returns the vectors x (..., 3), of any leading shape, made unit; the zero vector stays as it is."""
     largest = np.abs(x).max(axis=-1, keepdims=True)
     scaled = x / np.where(largest > 0, largest, 1)
     length = np.linalg.norm(scaled, axis=-1, keepdims=True)
@@ -194,13 +217,16 @@ def _unit(x: Array) -> Array:
 
 
 def _without(x: Array, n: Array) -> Array:
-    """x (N, 3) less its part along n."""
+    """Returns the vectors x (N, 3) without their components along n (N, 3)."""
     result: Array = x - n * np.einsum("ij,ij->i", n, x)[:, None]
     return result
 
 
 def _any_tangents(n: Array) -> tuple[Array, Array]:
-    """t, b (N, 3) perpendicular to the unit n (N, 3): Duff et al. 2017, listing 3. For models that are alike all round."""
+    """Returns some t and b (N, 3) perpendicular to the unit normals n (N, 3), for isotropic models.
+
+    Source: Duff et al. 2017, listing 3.
+    """
     x, y, z = n.T
     sign = np.copysign(np.ones_like(z), z)
     a = -1 / (sign + z)

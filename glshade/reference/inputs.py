@@ -1,7 +1,8 @@
-"""Inputs: the float32 values that the GPU is given, widened to float64, in the order they are drawn.
+"""Inputs: the float32 values that the GPU renderer uploads, widened to float64, in drawing order.
 
-This is all that the two renderers share: vertices, indices, uniforms and texels as uploaded. What a plan leaves out because it
-cannot show is not taken from the plan but from the scene, so that a plan which leaves out too much is found out.
+The two renderers share nothing but these values: vertices, indices, uniforms and texels. The values are taken from the scene
+and not from the plan of a GPU program (glshade/glsl/plan.py). If a plan wrongly leaves out a visible feature, the two pictures
+therefore differ.
 """
 
 from __future__ import annotations
@@ -13,14 +14,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.assembly.assembly import Assembly, Instance
+from glshade.assembly.assembly import Assembly
+from glshade.assembly.instance import Instance
 from glshade.assembly.part import Part
-from glshade.glsl.plan import ProgramPlan, plan_instance
+from glshade.glsl.plan import ProgramPlan
+from glshade.glsl.planner import plan_instance
 from glshade.radiance.draw import Draw, placed, wide
 from glshade.radiance.readying import ready
 from glshade.radiance.sampler import Sampler
 from glshade.scene.camera import window
-from glshade.scene.scene import Rate, Scene
+from glshade.scene.object import Rate
+from glshade.scene.scene import Scene
 from glshade.textures.texels import Texels
 
 Array = NDArray[np.float64]
@@ -29,9 +33,12 @@ Indices = NDArray[np.intp]
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """A scene as uploaded. size: width, height [pixels]. background (4,): linear, premultiplied. draws: opaque ones first.
+    """A scene with the values that the GPU renderer uploads.
 
-    window: x, y, width, height [pixels] of what is wanted of the picture; nothing else has fragments.
+    size: width and height of the whole picture [pixels].
+    background: the background (4,), linear and premultiplied.
+    draws: the instances with their values: opaque ones first, then blended ones from back to front.
+    window: x, y, width and height [pixels] of the part of the picture that is rendered.
     """
 
     size: tuple[int, int]
@@ -41,14 +48,17 @@ class Inputs:
 
     @cached_property
     def wanted(self) -> Indices:
-        """(h, w): the numbers of the window's pixels in the whole picture, ascending."""
+        """The numbers (h, w) of the window's pixels in the whole picture, row by row."""
         x, y, w, h = self.window
         return np.add.outer(np.arange(y, y + h) * self.size[0], np.arange(x, x + w))
 
 
 def prepare(scene: Scene, shading: Rate | None = None, part: Part | None = None) -> Inputs:
-    """The values that the GPU would be given for a linear picture with one sample a pixel. part: what of the scene it shows.
+    """The values that the GPU renderer uploads for a linear picture with one sample per pixel.
 
+    scene: the scene to draw.
+    shading: optional; replaces the shading rate of every object.
+    part: optional; the part of the scene's light, or the property of its surfaces, that is shown.
     Errors: SceneError, AssetError.
     """
     assembly = ready(scene, shading, part)
@@ -63,7 +73,10 @@ def prepare(scene: Scene, shading: Rate | None = None, part: Part | None = None)
 
 
 def _in_order(assembly: Assembly) -> Iterator[Instance]:
-    """Opaque instances, those of one program together; then blended ones, the farthest middle first."""
+    """Opaque instances grouped by program, then blended ones by the mean of their vertices, the farthest first.
+
+    The order is that of the GPU renderer: it matters where depths are equal and where surfaces are blended.
+    """
     by_program: dict[ProgramPlan, list[Instance]] = {}
     blended: list[tuple[float, Instance]] = []
     for instance in assembly.instances:

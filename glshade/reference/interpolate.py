@@ -1,6 +1,6 @@
-"""Interpolate: barycentric weights, perspective-correct, and their derivatives across the picture. OpenGL 4.6 core, 14.6.1.
+"""Interpolate: perspective-correct barycentric weights, and their derivatives across the picture (OpenGL 4.6 core, 14.6.1).
 
-From the positions as they are, not as they are snapped for coverage: that is what drivers do, and what a surface is.
+The weights come from the exact corners, not from the corners that are snapped for coverage. llvmpipe does the same.
 """
 
 from __future__ import annotations
@@ -18,9 +18,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """Of a triangle's three corners at some points: values (N, 3), which sum to 1, and their change a pixel, dx and dy (N, 3).
+    """The weights of the three corners of triangles at N points.
 
-    depth (N,): z/w there, 1 near and 0 far.
+    values: the weights (N, 3), which sum to 1.
+    dx: their derivatives (N, 3) to the right [1/pixel]; empty if they were not asked for.
+    dy: their derivatives (N, 3) downward [1/pixel]; empty if they were not asked for.
+    depth: the depth (N,) at the points, which is clip z divided by clip w: 1 near and 0 far.
     """
 
     values: Array
@@ -32,20 +35,26 @@ class Weights:
 def weights(
     draw: Draw, triangle: NDArray[Any], x: NDArray[Any], y: NDArray[Any], size: tuple[int, int], derivatives: bool = True
 ) -> Weights:
-    """The weights at the places x, y (N,) [pixels, row 0 at the top, pixel centres at + 0.5] of the triangles (N,).
+    """The weights of triangles at points of the picture.
 
-    A point q of the picture is where sum(beta_i p_i) is proportional to q in homogeneous coordinates: with the corners moved
-    so that q is the origin, beta_i is the cross product of the other two (Olano and Greer 1997). Corners behind the eye are no
-    exception. Without `derivatives` dx and dy are empty.
+    Let p_i be a triangle's corners in homogeneous coordinates. The weights beta_i of a point q make sum(beta_i p_i)
+    proportional to q. With the corners moved so that q is the origin, beta_i is the cross product of the other two corners
+    (Olano and Greer 1997). This also holds for corners behind the eye.
+    draw: the instance that is drawn.
+    triangle: the rows (N,) of its triangles, one for each point.
+    x: the points' x (N,) [pixels]; the centre of pixel i lies at i + 0.5.
+    y: the points' y (N,) [pixels]; row 0 is at the top.
+    size: width and height of the picture [pixels].
+    derivatives: whether to compute dx and dy.
     """
     corners = draw.clip[draw.triangles[triangle]]
     w = corners[..., 3]
     across = 0.5 * size[0] * (corners[..., 0] + w) - x[:, None] * w
     down = 0.5 * size[1] * (corners[..., 1] + w) - y[:, None] * w
-    one, other = [1, 2, 0], [2, 0, 1]
-    beta = across[:, one] * down[:, other] - across[:, other] * down[:, one]
+    second, third = [1, 2, 0], [2, 0, 1]
+    beta = across[:, second] * down[:, third] - across[:, third] * down[:, second]
     total = beta.sum(axis=1)
-    # Seen edge on a triangle has no inside, and all places on it are equally right.
+    # A triangle that is seen edge-on has no area, and every point on it is a valid answer: its centroid is taken.
     flat = ~(np.abs(total) > 0)
     beta[flat], total[flat] = 1.0, 3.0
     values = beta / total[:, None]
@@ -53,14 +62,14 @@ def weights(
     none = np.empty((0, 3))
     if not derivatives:
         return Weights(values, none, none, depth)
-    dx = w[:, other] * down[:, one] - w[:, one] * down[:, other]
-    dy = w[:, one] * across[:, other] - w[:, other] * across[:, one]
+    dx = w[:, third] * down[:, second] - w[:, second] * down[:, third]
+    dy = w[:, second] * across[:, third] - w[:, third] * across[:, second]
     dx, dy = ((d - values * d.sum(axis=1, keepdims=True)) / total[:, None] for d in (dx, dy))
     dx[flat], dy[flat] = 0.0, 0.0
     return Weights(values, dx, dy, depth)
 
 
 def blend(weight: Array, corners: NDArray[np.floating]) -> Array:
-    """(N, C): the mean of the corners' (N, 3, C) values by the weights (N, 3)."""
+    """The means (N, C) of the values (N, 3, C) at the corners of triangles, with the weights (N, 3)."""
     result: Array = np.einsum("ij,ijk->ik", weight, corners)
     return result

@@ -1,8 +1,8 @@
-"""Raster: which triangles cover which pixels, and which of them are seen. OpenGL 4.6 core, 14.6.1 and 17.3.4.
+"""Raster: the coverage of pixels by triangles, and the depth test (OpenGL 4.6 core, 14.6.1 and 17.3.4).
 
-Corners are snapped to 1/256 of a pixel (GL_SUBPIXEL_BITS of every driver at hand), and a pixel belongs to a triangle when its
-centre lies inside, or on an edge that is the triangle's left or top one. Every number here is a whole number of 1/256 pixels,
-or a product of two, kept exactly in float64 up to pictures of 2^16 pixels a side.
+Corners are snapped to 1/256 of a pixel (GL_SUBPIXEL_BITS is 8 on all drivers that were tried). A triangle covers a pixel if
+the pixel's centre lies inside it, or on one of its left or top edges. Coordinates are integers in units of 1/256 pixel; float64
+holds them and their products exactly for pictures of up to 2^16 pixels a side.
 """
 
 from __future__ import annotations
@@ -24,23 +24,30 @@ Flags = NDArray[np.bool_]
 Indices = NDArray[np.intp]
 Box = tuple[int, int, int, int]
 
+# The number of snapping steps per pixel.
 SUBPIXELS = 256
 HALF = SUBPIXELS // 2
-# Nearer to an edge than this [1/256 pixel] a driver may decide either way: its corners are float32 before they are snapped,
-# which moves them by a step, and the edges between them by no more; the rest is to spare.
+# If a pixel's centre is nearer to an edge than this [1/256 pixel], a driver may draw the pixel or not. A driver rounds corners
+# to float32 before it snaps them, which may move the corners and the edges between them by one step. The other two are a
+# reserve.
 MARGIN = 3.0
-# Triangles, and candidate pixels, looked at in one go: arrays of some 10 MB stay near the caches.
+# The numbers of triangles and of candidate pixels that are processed at once. They make arrays of about 10 MB, which use the
+# processor's caches better than larger arrays.
 TRIANGLES = 1 << 17
 PIXELS = 1 << 18
 
 
 @dataclass(frozen=True, eq=False)
 class Fragments:
-    """Pixels of triangles, as flat arrays (N,).
+    """N pairs of a triangle and a pixel, as arrays (N,).
 
-    draw: index into Inputs.draws. triangle: row of the draw's triangles. pixel: row x width + column, row 0 at the top.
-    covered: whether the fill rule gives the pixel to the triangle. partial: whether its centre is so near an edge that a
-    driver may decide otherwise. front: whether the front is seen. depth: at the pixel's centre, 1 near and 0 far.
+    draw: the index into Inputs.draws.
+    triangle: the row of the draw's triangles.
+    pixel: the number of the pixel, row * width + column, row 0 at the top.
+    covered: whether the triangle covers the pixel by the fill rule.
+    partial: whether the pixel's centre is so near to an edge that a driver may decide otherwise.
+    front: whether the front of the triangle is seen.
+    depth: the depth at the pixel's centre, 1 near and 0 far.
     """
 
     draw: NDArray[np.int32]
@@ -55,39 +62,47 @@ class Fragments:
         return len(self.pixel)
 
     def take(self, which: Any) -> Fragments:
-        """Those that an index array or a mask selects."""
+        """The fragments that an index array or a mask selects."""
         return Fragments(**{f.name: getattr(self, f.name)[which] for f in fields(self)})
 
     @classmethod
     def joined(cls, parts: Iterable[Fragments]) -> Fragments:
-        """All of them, in the order given."""
+        """The fragments of all parts, in the order of the parts."""
         parts = list(parts) or [cls.none()]
         return cls(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)})
 
     @classmethod
     def none(cls) -> Fragments:
-        """Not one."""
-        types: dict[str, Any] = {
-            **{"pixel": np.int64, "depth": np.float64},
-            **dict.fromkeys(("covered", "partial", "front"), np.bool_),
-        }
-        return cls(**{f.name: np.empty(0, dtype=types.get(f.name, np.int32)) for f in fields(cls)})
+        """An empty list of fragments."""
+        return cls(
+            draw=np.empty(0, dtype=np.int32),
+            triangle=np.empty(0, dtype=np.int32),
+            pixel=np.empty(0, dtype=np.int64),
+            covered=np.empty(0, dtype=np.bool_),
+            partial=np.empty(0, dtype=np.bool_),
+            front=np.empty(0, dtype=np.bool_),
+            depth=np.empty(0, dtype=np.float64),
+        )
 
 
 def rasterise(inputs: Inputs, margin: float = 0.0) -> Iterator[Fragments]:
-    """All fragments in the order of drawing, hidden ones too, in pieces of some 100,000.
+    """All fragments, including hidden ones, draw by draw, in pieces of about 100,000.
 
-    margin [1/256 pixel]: 0 for the covered ones alone; MARGIN for every fragment that a driver might draw.
+    inputs: the scene with its uploaded values.
+    margin: 0 for the covered fragments only, MARGIN for every fragment that a driver might draw [1/256 pixel].
     """
     for number, draw in enumerate(inputs.draws):
         yield from _rasterise(draw, number, inputs.size, inputs.window, margin)
 
 
 def resolve(inputs: Inputs, parts: Iterable[Fragments], opaque: Callable[[Fragments], Flags]) -> tuple[Fragments, Fragments]:
-    """(nearest, layers) of the covered fragments: what is seen at each pixel, and what is blended over it.
+    """Applies the depth test to covered fragments: (nearest opaque fragments, blended fragments in front of them).
 
-    nearest: at most one a pixel, by pixel; depths are compared as float32, and of equal ones the first drawn wins. layers: in
-    front of the nearest, by pixel and in the order of drawing. opaque: which fragments of a cut-out are there.
+    There is at most one nearest fragment per pixel, and they are ordered by pixel. Depths are compared as float32. Between
+    equal depths, the fragment that is drawn first wins. The blended fragments are ordered by pixel and then in drawing order.
+    inputs: the scene with its uploaded values.
+    parts: the fragments, draw by draw.
+    opaque: a function that returns whether each given fragment of a cut-out is kept.
     """
     width, height = inputs.size
     depth = np.zeros(width * height, dtype=np.float32)
@@ -97,7 +112,7 @@ def resolve(inputs: Inputs, parts: Iterable[Fragments], opaque: Callable[[Fragme
     for part in parts:
         mode = modes[part.draw]
         z, before = part.depth.astype(np.float32), depth[part.pixel]
-        # Pieces come draw by draw, but within one not triangle by triangle.
+        # The pieces come draw by draw, but the fragments of one draw are not ordered by triangle.
         earlier = (part.draw == seen["draw"][part.pixel]) & (part.triangle < seen["triangle"][part.pixel])
         near = part.covered & (z > 0) & ((z > before) | ((z == before) & earlier & (mode != "blend")))
         blended = part.take(near & (mode == "blend"))
@@ -106,10 +121,11 @@ def resolve(inputs: Inputs, parts: Iterable[Fragments], opaque: Callable[[Fragme
         part = part.take(near & (mode != "blend"))
         masked = np.flatnonzero(modes[part.draw] == "mask")
         if len(masked):
-            there = np.ones(len(part), dtype=np.bool_)
-            there[masked] = opaque(part.take(masked))
-            part = part.take(there)
-        # The least of (pixel, farness, place in the order of drawing) is what the depth test leaves at a pixel.
+            kept = np.ones(len(part), dtype=np.bool_)
+            kept[masked] = opaque(part.take(masked))
+            part = part.take(kept)
+        # The depth test keeps the fragment of the largest depth at a pixel, and among equal depths the one that is drawn first.
+        # After sorting, it is the first fragment of the pixel.
         z = part.depth.astype(np.float32)
         order = np.lexsort((part.triangle, part.draw, -z, part.pixel))
         first = np.ones(len(order), dtype=np.bool_)
@@ -124,8 +140,16 @@ def resolve(inputs: Inputs, parts: Iterable[Fragments], opaque: Callable[[Fragme
 
 
 def _rasterise(draw: Draw, number: int, size: tuple[int, int], window: Box, margin: float) -> Iterator[Fragments]:
+    """The fragments of one draw.
+
+    draw: the instance that is drawn.
+    number: its index into Inputs.draws.
+    size: width and height of the whole picture [pixels].
+    window: x, y, width and height of the part that is rendered [pixels].
+    margin: as for rasterise [1/256 pixel].
+    """
     code = clip.outside(draw.clip)
-    # What sticks out at the sides may stay whole; what reaches past near or far must be cut.
+    # Triangles must be clipped if they reach beyond the near or far plane, or beyond the guard band at the sides.
     cut = (clip.outside(draw.clip, clip.GUARDED) != 0) | (code & 0b110000 != 0)
     snapped = _snapped(np.where(cut[:, None], (0.0, 0.0, 0.0, 1.0), draw.clip), size)
     for start in range(0, len(draw.triangles), TRIANGLES):
@@ -157,7 +181,11 @@ def _rasterise(draw: Draw, number: int, size: tuple[int, int], window: Box, marg
 
 
 def _snapped(points: Array, size: tuple[int, int]) -> Array:
-    """(..., 2): where the clip-space points (..., 4) with w > 0 come to lie in the picture [1/256 pixel], whole numbers."""
+    """The positions (..., 2) of points in the picture, rounded to integers [1/256 pixel].
+
+    points: points (..., 4) in clip space with w > 0, of any leading shape, which the result keeps.
+    size: width and height of the whole picture [pixels].
+    """
     scale = 0.5 * SUBPIXELS * np.array(size)
     result: Array = np.rint((points[..., :2] / points[..., 3:] + 1) * scale)
     return result
@@ -166,23 +194,26 @@ def _snapped(points: Array, size: tuple[int, int]) -> Array:
 def _cover(
     polygons: Array, window: Box, draw: Draw, margin: float
 ) -> Iterator[tuple[Indices, Indices, Indices, Flags, Flags, Flags]]:
-    """(polygon, x, y, covered, partial, front) of convex polygons (P, E, 2) [1/256 pixel], by polygon.
+    """Yields (polygon, x, y, covered, partial, front) of the pixels in convex polygons, in batches, ordered by polygon.
 
-    window: x, y, width, height [pixels] that are looked at.
+    polygons: the corners (P, E, 2) of P polygons with E corners each [1/256 pixel].
+    window: x, y, width and height of the part that is rendered [pixels].
+    draw: the instance that they belong to.
+    margin: as for rasterise [1/256 pixel].
     """
     following = np.roll(polygons, -1, axis=1)
     across, down = following[..., 0] - polygons[..., 0], following[..., 1] - polygons[..., 1]
-    # Twice the area, from the first corner, so that no large numbers are subtracted.
+    # Twice the area, from vectors relative to the first corner, which avoids the subtraction of large numbers.
     rays = polygons[:, 1:] - polygons[:, :1]
     area = (rays[:, :-1, 0] * rays[:, 1:, 1] - rays[:, :-1, 1] * rays[:, 1:, 0]).sum(axis=1)
     length = np.hypot(across, down)
-    # y points down, so what is counter-clockwise in space has a negative area here.
+    # y points down in the picture, so polygons that are counter-clockwise in space have a negative area.
     front = (area < 0) != draw.instance.mirrored
     drawn = area != 0
     if not draw.instance.back_faces:
         drawn &= front
     if margin:
-        # Lower than two steps, a triangle may turn over, or get an area, when a corner moves by one.
+        # A triangle lower than two snapping steps may turn over, or gain an area, when a corner moves by one step.
         thin = np.abs(area) <= 2 * length.max(axis=1)
         front |= thin & (not draw.instance.back_faces)
         drawn |= thin
@@ -193,18 +224,18 @@ def _cover(
     kept = np.flatnonzero(drawn & (low <= high).all(axis=1))
     low, high, front = low[kept], high[kept], front[kept]
     turn = np.where(area[kept] < 0, -1.0, 1.0)[:, None]
-    # Inside is where inward . (centre - corner) > 0 for every edge.
+    # A centre is inside a polygon where inward . (centre - corner) > 0 for every edge.
     edges = _Edges(polygons[kept], -down[kept] * turn, across[kept] * turn, length[kept], margin)
     rows = (high[:, 1] - low[:, 1] + 1).astype(np.intp)
-    for several in _batches(rows):
-        index, step = _expanded(rows[several], several.start)
+    for row_batch in _batches(rows):
+        index, step = _expanded(rows[row_batch], row_batch.start)
         y = low[index, 1] + step
         left, right = edges.span(index, y * SUBPIXELS + HALF)
         left = np.maximum(np.ceil((left - HALF) / SUBPIXELS - 1e-6), low[index, 0])
         right = np.minimum(np.floor((right - HALF) / SUBPIXELS + 1e-6), high[index, 0])
         columns = np.maximum(right - left + 1, 0).astype(np.intp)
-        for some in _batches(columns):
-            row, step = _expanded(columns[some], some.start)
+        for pixel_batch in _batches(columns):
+            row, step = _expanded(columns[pixel_batch], pixel_batch.start)
             polygon = index[row]
             px, py = left[row] + step, y[row]
             covered, partial = edges.inside(polygon, px * SUBPIXELS + HALF, py * SUBPIXELS + HALF)
@@ -221,18 +252,28 @@ def _cover(
 
 
 class _Edges:
-    """Edges of polygons: corners (P, E, 2), inward normals x, y (P, E) and their lengths (P, E), 0 where corners coincide."""
+    """The edges of P polygons with E edges each.
+
+    corner_x: x (P, E) of the edges' first corners [1/256 pixel].
+    corner_y: y (P, E) of the edges' first corners [1/256 pixel].
+    x: x (P, E) of the inward normals, which are as long as their edges.
+    y: y (P, E) of the inward normals.
+    slack: the margin (P, E) times the edges' lengths.
+    real: whether (P, E) the edge has a length; repeated corners make edges without one.
+    owns: whether (P, E) points on the edge belong to the polygon.
+    """
 
     def __init__(self, corners: Array, x: Array, y: Array, length: Array, margin: float) -> None:
+        """corners: (P, E, 2) [1/256 pixel]. x, y: the inward normals (P, E). length: the edges' lengths (P, E)."""
         self.corner_x, self.corner_y = corners[..., 0], corners[..., 1]
         self.x, self.y = x, y
         self.slack = margin * length
         self.real = length > 0
-        # On an edge: left edges look right, and of the level ones the top one looks down.
+        # The fill rule: the inward normal of a left edge points right, and that of a top edge points straight down.
         self.owns = ~self.real | (x > 0) | ((x == 0) & (y > 0))
 
     def span(self, polygon: Indices, y: Array) -> tuple[Array, Array]:
-        """From where to where the row y (N,) [1/256 pixel] of the polygons (N,) lies inside, or within the margin."""
+        """The range of x, (left, right), each (N,), in which the row y (N,) is inside its polygon (N,) or within the margin."""
         x = self.x[polygon]
         rise = self.y[polygon] * (y[:, None] - self.corner_y[polygon]) + self.slack[polygon]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -243,20 +284,20 @@ class _Edges:
         return left, right
 
     def inside(self, polygon: Indices, x: Array, y: Array) -> tuple[Flags, Flags]:
-        """(covered, partial) of the points x, y (N,) [1/256 pixel]."""
+        """(covered, partial), each (N,): the flags of each point x, y (N,) [1/256 pixel] in its polygon (N,)."""
         distance = self.x[polygon] * (x[:, None] - self.corner_x[polygon])
         distance += self.y[polygon] * (y[:, None] - self.corner_y[polygon])
         covered = np.all((distance > 0) | ((distance == 0) & self.owns[polygon]), axis=1)
         slack = self.slack[polygon]
         near = np.all(distance >= -slack, axis=1)
-        # A polygon whose corners all come to lie on one point has no edge to be far from, and no inside either.
+        # A polygon whose corners all coincide has no edges with a length, and no inside.
         real = self.real[polygon]
         full = np.all((distance > slack) | ~real, axis=1) & real.any(axis=1)
         return covered, np.logical_and(near, ~full)
 
 
 def _batches(counts: Indices) -> Iterator[slice]:
-    """Slices of `counts` (N,), each of a sum of about PIXELS."""
+    """Yields slices of `counts` (N,). The elements of each add up to at most PIXELS, unless it has a single element."""
     total = np.cumsum(counts)
     if len(total) == 0 or total[-1] == 0:
         return
@@ -269,7 +310,7 @@ def _batches(counts: Indices) -> Iterator[slice]:
 
 
 def _expanded(counts: Indices, start: int) -> tuple[Indices, Indices]:
-    """start + i counts[i] times over, for every i, and beside each its number from 0."""
+    """Two arrays: start + i, repeated counts[i] times for every i; and the number of each repetition, from 0 for every i."""
     index = np.repeat(np.arange(len(counts)), counts)
     step = np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
     return index + start, step

@@ -1,7 +1,7 @@
-"""Shade: what a fragment shows to the viewer, in linear light.
+"""Shade: computes the linear light from fragments toward the viewer.
 
-The models are evaluated through their float64 values in local coordinates (z along the normal). A fragment list is all it
-takes, wherever it comes from; sample positions, texture level and precision can be varied, to learn what a picture hangs on.
+The models are evaluated by their Python functions in local coordinates (z along the normal). The position of the sample, the
+level of detail and the precision can be varied, to find out how far the picture depends on them.
 """
 
 from __future__ import annotations
@@ -13,21 +13,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.radiance.draw import Draw
-from glshade.radiance.surface import Surface, alpha_of, at_vertices, shown, toward_viewer
+from glshade.radiance.surface import Surface, alpha_of, at_vertices, evaluate_surface, toward_viewer
 from glshade.reference.inputs import Inputs
 from glshade.reference.interpolate import blend, weights
 from glshade.reference.raster import Fragments
 
 Array = NDArray[Any]
 
-# Fragments shaded in one go: their arrays stay in the caches.
+# The number of fragments that are shaded at once. Their arrays then fit into the processor's caches.
 PIECE = 1 << 15
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """How fragments are looked at. offset [pixels]: of the sample from the pixel's centre, right and down. level: added to the
-    textures' level of detail. dtype: of everything after interpolation, and of the vertex stage."""
+    """The conditions under which fragments are shaded.
+
+    offset: the sample's distance from the pixel's centre, (right, down) [pixels].
+    level: a number that is added to the level of detail of textures.
+    dtype: the precision of the vertex stage and of all steps after the interpolation.
+    """
 
     offset: tuple[float, float] = (0.0, 0.0)
     level: float = 0.0
@@ -37,37 +41,42 @@ class Sampling:
 AT_CENTRE = Sampling()
 
 
-def shade(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) -> Array:
-    """(N, 4): linear Rec. 709, premultiplied, for fragments of any draws in any order. A cut-out's are taken to be there."""
+def shade_fragments(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) -> Array:
+    """The colours (N, 4) of fragments, linear Rec. 709 and premultiplied. Fragments of cut-outs are not discarded.
+
+    inputs: the scene with its uploaded values.
+    fragments: fragments of any draws in any order.
+    sampling: where and how precisely they are shaded.
+    """
     result = np.zeros((len(fragments), 4), dtype=sampling.dtype)
-    for draw, which, some in by_draw(inputs, fragments):
-        light = _RATES[draw.instance.rate](draw, some, inputs.size, sampling)
+    for draw, indices, part in by_draw(inputs, fragments):
+        light = _RATES[draw.instance.rate](draw, part, inputs.size, sampling)
         if draw.alpha_mode == "blend":
-            alpha = alpha_of(draw, surface_at(draw, some, inputs.size, sampling))[:, None]
-            result[which] = np.concatenate([light * alpha, alpha], axis=1)
+            alpha = alpha_of(draw, surface_at(draw, part, inputs.size, sampling))[:, None]
+            result[indices] = np.concatenate([light * alpha, alpha], axis=1)
         else:
-            result[which, :3], result[which, 3] = light, 1.0
+            result[indices, :3], result[indices, 3] = light, 1.0
     return result
 
 
 def opacity(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) -> Array:
-    """(N,): alpha as the textures and colours say, before a cut-out compares it."""
+    """The alpha (N,) of fragments from material, texture and vertex colour, before a cut-out compares it with its cutoff."""
     result = np.ones(len(fragments), dtype=sampling.dtype)
-    for draw, which, some in by_draw(inputs, fragments):
+    for draw, indices, part in by_draw(inputs, fragments):
         if draw.alpha_mode != "opaque":
-            result[which] = alpha_of(draw, surface_at(draw, some, inputs.size, sampling))
+            result[indices] = alpha_of(draw, surface_at(draw, part, inputs.size, sampling))
     return result
 
 
 def is_there(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) -> NDArray[np.bool_]:
-    """(N,): which fragments a cut-out keeps."""
+    """Whether each fragment (N,) is kept. A fragment of a cut-out is discarded if its alpha is below the cutoff."""
     cutoff = np.array([draw.alpha_cutoff if draw.alpha_mode == "mask" else -np.inf for draw in inputs.draws])
-    there: NDArray[np.bool_] = opacity(inputs, fragments, sampling) >= cutoff[fragments.draw].astype(sampling.dtype)
-    return there
+    kept: NDArray[np.bool_] = opacity(inputs, fragments, sampling) >= cutoff[fragments.draw].astype(sampling.dtype)
+    return kept
 
 
 def by_draw(inputs: Inputs, fragments: Fragments) -> Any:
-    """(draw, indices, fragments) in pieces of one draw each."""
+    """Yields (draw, indices of some of its fragments, these fragments), with at most PIECE fragments at a time."""
     order = np.argsort(fragments.draw, kind="stable")
     bounds = np.searchsorted(fragments.draw[order], np.arange(len(inputs.draws) + 1))
     for draw, first, end in zip(inputs.draws, bounds[:-1], bounds[1:], strict=True):
@@ -77,14 +86,15 @@ def by_draw(inputs: Inputs, fragments: Fragments) -> Any:
 
 
 def _per_pixel(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Array:
+    """The light (N, 3) of fragments that are shaded at their samples."""
     surface = surface_at(draw, fragments, size, sampling)
     sides = draw.instance.back_faces
     side = np.where(fragments.front | (not sides), 1.0, -1.0).astype(sampling.dtype)
-    return shown(draw, replace(surface, side=side))
+    return evaluate_surface(draw, replace(surface, side=side))
 
 
 def _per_vertex(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Array:
-    """Shaded at the corners, each for the side that the fragment shows, then interpolated."""
+    """The light (N, 3) of fragments, shaded at the corners for the side that the fragment shows, and interpolated."""
     corners = draw.triangles[fragments.triangle]
     x, y = places(fragments, size, sampling)
     weight = weights(draw, fragments.triangle, x, y, size, derivatives=False).values.astype(sampling.dtype)
@@ -94,19 +104,19 @@ def _per_vertex(draw: Draw, fragments: Fragments, size: tuple[int, int], samplin
         if len(which):
             vertices, place = np.unique(corners[which], return_inverse=True)
             surface = at_vertices(draw, vertices, sampling.dtype)
-            light = shown(draw, replace(surface, side=np.full(len(vertices), side, dtype=sampling.dtype)))
+            light = evaluate_surface(draw, replace(surface, side=np.full(len(vertices), side, dtype=sampling.dtype)))
             result[which] = blend(weight[which], light[place.reshape(-1, 3)])
     return result
 
 
 def _per_face(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Array:
-    """Shaded once at the centroid; all three corners carry it."""
+    """The light (N, 3) of fragments whose triangle is shaded once, at its centroid."""
     faces, place = np.unique(fragments.triangle, return_inverse=True)
     surface = at_vertices(draw, draw.triangles[faces, 2], sampling.dtype, centroids=True)
     if draw.instance.back_faces:
         facing = np.einsum("ij,ij->i", surface.normal, toward_viewer(draw, surface.position)) >= 0
         surface = replace(surface, side=np.where(facing, 1.0, -1.0).astype(sampling.dtype))
-    result: Array = shown(draw, surface)[place]
+    result: Array = evaluate_surface(draw, surface)[place]
     return result
 
 
@@ -114,12 +124,13 @@ _RATES = {"phong": _per_pixel, "gouraud": _per_vertex, "flat": _per_face}
 
 
 def places(fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> tuple[Array, Array]:
+    """The positions x, y (N,) of the fragments' samples in the picture [pixels]."""
     y, x = np.divmod(fragments.pixel.astype(np.intp), size[0])
     return x + 0.5 + sampling.offset[0], y + 0.5 + sampling.offset[1]
 
 
 def surface_at(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Surface:
-    """The surface at fragments, interpolated."""
+    """The interpolated surface attributes at the samples of fragments."""
     triangle = fragments.triangle
     x, y = places(fragments, size, sampling)
     textured = bool(draw.pictures)

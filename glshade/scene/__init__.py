@@ -1,1 +1,1 @@
-"""Scene: the document that says what a picture shows, and its files."""
+"""Scene: the document that describes a picture, its parts, and the files that it is read from."""

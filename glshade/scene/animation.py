@@ -1,4 +1,4 @@
-"""Animation: values of a scene that change from frame to frame, by dotted keys as `--set` takes them."""
+"""Animation: tracks, which give single values of a scene a new value in every frame."""
 
 from __future__ import annotations
 
@@ -18,15 +18,16 @@ Value = Finite | tuple[Finite, ...]
 
 
 class Track(Document):
-    """One value over time. Before the first of its frames it is the first, after the last the last."""
+    """One value of the scene over time. Before its first frame it has the first value, after its last frame the last."""
 
-    key: str = Field(
-        description='dotted, as --set takes it: "camera.turn", "objects.ball.transform.translate", "lights.key.intensity"'
+    key: str = Field(description='dotted key of the value, as for --set: "camera.turn", "objects.ball.transform.translate"')
+    frames: Annotated[tuple[Finite, ...], Field(min_length=1)] = Field(
+        description="frame numbers of the values, ascending; fractions are allowed"
     )
-    frames: Annotated[tuple[Finite, ...], Field(min_length=1)] = Field(description="ascending; fractions are allowed")
-    values: tuple[Value, ...] = Field(description="a number, or as many numbers as the value has, for each of the frames")
+    values: tuple[Value, ...] = Field(description="the value at each of the frames: a number or a list of numbers")
     interpolation: Literal["linear", "smooth", "step"] = Field(
-        "linear", description="smooth: a monotone cubic, which never goes beyond its keys; step: the last key's"
+        "linear",
+        description="between two frames; smooth: a monotone cubic that stays between their values; step: the earlier value",
     )
 
     @classmethod
@@ -43,48 +44,59 @@ class Track(Document):
             yield ("values",), "must all be single numbers, or lists of one length"
 
     def at(self, frame: float) -> float | list[float]:
-        """The value at a frame."""
+        """Returns the value at a frame, which may be a fraction: a number, or a list of numbers where the values are lists."""
         times, values = np.array(self.frames), np.array(self.values, dtype=np.float64)
         if self.interpolation == "step" or len(times) == 1:
-            found = values[max(int(np.searchsorted(times, frame, side="right")) - 1, 0)]
+            value = values[max(int(np.searchsorted(times, frame, side="right")) - 1, 0)]
         else:
             t = float(np.clip(frame, times[0], times[-1]))
             i = min(max(int(np.searchsorted(times, t, side="right")) - 1, 0), len(times) - 2)
             width = times[i + 1] - times[i]
             u = (t - times[i]) / width
             if self.interpolation == "linear":
-                found = values[i] * (1 - u) + values[i + 1] * u
+                value = values[i] * (1 - u) + values[i + 1] * u
             else:
+                # This is the cubic Hermite spline of the two values and of the slopes there.
                 slope = slopes(times, values)
-                found = (
+                value = (
                     (1 + 2 * u) * (1 - u) ** 2 * values[i]
                     + u * (1 - u) ** 2 * width * slope[i]
                     + u * u * (3 - 2 * u) * values[i + 1]
                     + u * u * (u - 1) * width * slope[i + 1]
                 )
-        result: float | list[float] = found.tolist()
+        result: float | list[float] = value.tolist()
         return result
 
 
 def slopes(times: Array, values: Array) -> Array:
-    """Of a cubic through the keys (K,) and (K, ...) that never goes beyond them: 0 at a key that is an extreme, else the
-    weighted harmonic mean of the slopes to either side (Fritsch and Butland 1984); at the ends 0, so that motion eases."""
+    """Returns the slopes (K, ...) at K keys, for a cubic spline that stays between the values of two neighbouring keys.
+
+    A slope is the weighted harmonic mean of the slopes of the straight lines to either side (Fritsch and Butland 1984). It is 0
+    at a key whose value is an extreme, and at the first and last key, so that a motion starts and ends gently.
+    times: the keys' frames (K,), ascending.
+    values: the keys' values (K, ...): single numbers, or arrays of any one shape.
+    """
     steps = np.diff(times)
     shape = (-1, *[1] * (values.ndim - 1))
     width = steps.reshape(shape)
     across = np.diff(values, axis=0) / width
     result = np.zeros_like(values)
     before, after = across[:-1], across[1:]
-    one, other = 2 * width[1:] + width[:-1], width[1:] + 2 * width[:-1]
-    same = before * after > 0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        mean = (one + other) / (one / before + other / after)
-    result[1:-1] = np.where(same, mean, 0.0)
+    weight_before, weight_after = 2 * width[1:] + width[:-1], width[1:] + 2 * width[:-1]
+    # Both slopes are counted in units of the smaller one, because the inverse of a tiny slope would overflow.
+    smaller = np.minimum(np.abs(before), np.abs(after))
+    with np.errstate(invalid="ignore"):
+        inverse = weight_before * (smaller / np.abs(before)) + weight_after * (smaller / np.abs(after))
+        mean = np.sign(before) * smaller * ((weight_before + weight_after) / inverse)
+    result[1:-1] = np.where(np.sign(before) * np.sign(after) > 0, mean, 0.0)
     return result
 
 
 def at_frame(document: Mapping[str, Any], tracks: Iterable[Track], frame: float) -> dict[str, Any]:
-    """The document as it is at a frame. Errors: OverrideError for a key that leads nowhere."""
+    """Returns a copy of the document with the values that the tracks have at a frame.
+
+    Errors: OverrideError for a track whose key names no value of the document.
+    """
     result = dict(document)
     for track in tracks:
         result = apply(result, track.key, track.at(frame))

@@ -1,4 +1,4 @@
-"""Camera: where the viewer stands, and the matrices that follow. All in float64; rounding comes with the upload."""
+"""Camera: the keys of cameras, and the views and matrices that follow from them, all in float64 until they are uploaded."""
 
 import math
 from collections.abc import Iterable, Mapping
@@ -15,16 +15,17 @@ Array = NDArray[np.float64]
 Row4 = tuple[Finite, Finite, Finite, Finite]
 Matrix4 = tuple[Row4, Row4, Row4, Row4]
 
-# A fitted view leaves this share of air round the scene.
+# A camera that frames the scene shows 8 % more than the scene's extent, so that nothing touches the picture's edge.
 MARGIN = 1.08
-# From where a scene is seen when nobody says: from the front, a little to the right and above.
+# The direction from the scene to the default eye: in front of the scene, a little to the right and above.
 THREE_QUARTERS = (0.55, 0.4, 1.0)
-# The near plane keeps at least this share of the far plane's distance: with reversed float depth that costs no precision.
+# The default near plane is at least this share of the far plane's depth. Reversed depth in float32 allows so small a share
+# without a loss of precision.
 NEAREST_SHARE = 1e-7
 
 
 def affine(matrix: Matrix4) -> Matrix4:
-    """Refuses what is not an invertible affine matrix."""
+    """Returns the matrix; refuses one that is not affine, or that cannot be inverted."""
     if matrix[3] != (0.0, 0.0, 0.0, 1.0):
         raise fault(f"the last row must be [0, 0, 0, 1], not {list(matrix[3])}: rows top to bottom, column vectors")
     if is_singular(np.array(matrix)[:3, :3]):
@@ -33,17 +34,22 @@ def affine(matrix: Matrix4) -> Matrix4:
 
 
 def is_singular(linear: Array) -> bool:
-    """Whether a (3, 3) matrix flattens space, whatever its scale: its columns, made unit, span (almost) no volume."""
+    """Whether a matrix (3, 3) flattens space, whatever its scale: its columns, made unit, span a volume below 1e-9."""
     length = np.linalg.norm(linear, axis=0)
     return not bool(np.all(length > 0)) or abs(np.linalg.det(linear / length)) < 1e-9
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A camera in its place.
+    """A camera at its final position, from which the matrices follow.
 
-    eye (3,): the origin of camera-relative space. axes (3, 3): rows right, up, backward, unit, in world space.
-    half_width, half_height: of the picture at depth 1 (perspective) or at any depth (orthographic). near, far: depths.
+    perspective: whether the view is perspective; else it is orthographic.
+    eye: position of the viewer (3,), the origin of camera-relative space [scene units].
+    axes: the unit directions right, up and backward as rows (3, 3), in world space.
+    half_width: half the width that the picture spans, at depth 1 if perspective, at any depth if orthographic [scene units].
+    half_height: half the height that the picture spans, likewise [scene units].
+    near: depth of the near plane [scene units].
+    far: depth of the far plane [scene units].
     """
 
     perspective: bool
@@ -56,19 +62,23 @@ class View:
 
     @property
     def toward_viewer(self) -> Array:
-        """(3,): v of an orthographic view."""
+        """The unit direction to the viewer (3,), which is the same at every point of an orthographic view."""
         backward: Array = self.axes[2]
         return backward
 
     def depth(self, points: Array) -> Array:
-        """How far in front of the eye plane the world points (..., 3) are."""
+        """Returns the distances (...) of points in front of the eye's plane [scene units].
+
+        points: points (..., 3) in world space, of any leading shape, which the result keeps.
+        """
         depth: Array = np.asarray(-(points - self.eye) @ self.axes[2])
         return depth
 
     def clip_from_world(self, zero_to_one: bool = True) -> Array:
-        """(4, 4), for camera-relative points. y points down, so that row 0 is the top; depth is reversed: 1 near, 0 far.
+        """Returns the clip matrix (4, 4) for camera-relative points.
 
-        zero_to_one: clip z in [0, w], else in [-w, w] for drivers without glClipControl.
+        y points down, so that row 0 of the picture is its top. Depth is reversed: it is 1 at the near plane, 0 at the far one.
+        zero_to_one: whether clip z lies in [0, w]; else it lies in [-w, w], for drivers without glClipControl.
         """
         n, f = self.near, self.far
         projection = np.zeros((4, 4))
@@ -88,7 +98,13 @@ class View:
 
 
 def window(clip: Array, size: tuple[int, int], x: float, y: float, width: int, height: int) -> Array:
-    """The clip matrix whose picture is the window at (x, y), `width` by `height` pixels, of the whole picture of `size`."""
+    """Returns the clip matrix (4, 4) that draws a window of a picture as a picture of its own.
+
+    clip: the clip matrix (4, 4) of the whole picture.
+    size: width and height of the whole picture [pixels].
+    x, y: the window's top left corner [pixels].
+    width, height: the window's size [pixels].
+    """
     whole_width, whole_height = size
     part = clip.copy()
     part[0] = clip[0] * (whole_width / width) + clip[3] * ((whole_width - 2 * x - width) / width)
@@ -97,20 +113,20 @@ def window(clip: Array, size: tuple[int, int], x: float, y: float, width: int, h
 
 
 class Camera(Document):
-    """What every camera has: eye, target and up; or matrix; or nothing, and it frames the scene."""
+    """The keys that every camera has: eye, target and up, or matrix. A camera with neither eye nor matrix frames the scene."""
 
     type: str
-    name: str | None = Field(None, description="for messages")
-    eye: Vector3 | None = Field(None, description="where the viewer is; left out: where the whole scene is seen")
-    target: Vector3 | None = Field(None, description="the point in the middle of the picture; left out: the scene's middle")
-    up: Direction = Field((0.0, 1.0, 0.0), description="the direction that is up in the picture")
+    name: str | None = Field(None, description="name of the camera, for messages")
+    eye: Vector3 | None = Field(None, description="position of the viewer; left out: a position that shows the whole scene")
+    target: Vector3 | None = Field(None, description="point in the middle of the picture; left out: the middle of the scene")
+    up: Direction = Field((0.0, 1.0, 0.0), description="direction that points up in the picture")
     matrix: Annotated[Matrix4, AfterValidator(affine)] | None = Field(
         None, description="world from camera, in place of eye, target and up: x right, y up, looking along -z"
     )
-    fit: bool = Field(False, description="keep the direction of view, and move to where the whole scene is seen")
-    turn: Finite = Field(0.0, description="turned round the target, or the scene's middle, about up: a turntable [degrees]")
-    near: Finite | None = Field(None, description="depth of the near plane; left out: from the scene")
-    far: Finite | None = Field(None, description="depth of the far plane; left out: from the scene")
+    fit: bool = Field(False, description="keeps the direction of view, and moves the eye until it sees the whole scene")
+    turn: Finite = Field(0.0, description="turns the camera round the target or the scene's middle, about up [degrees]")
+    near: Finite | None = Field(None, description="depth of the near plane; left out: in front of the scene")
+    far: Finite | None = Field(None, description="depth of the far plane; left out: behind the scene")
 
     @classmethod
     def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
@@ -120,7 +136,7 @@ class Camera(Document):
         if data.get("matrix") is not None:
             for key in ("eye", "target", "up"):
                 if data.get(key) is not None:
-                    yield (key,), "not together with matrix, which says it all"
+                    yield (key,), "cannot be used together with matrix, which replaces it"
         near, far = data.get("near"), data.get("far")
         if isinstance(near, number) and isinstance(far, number) and near >= far:
             yield ("near",), f"{near:g} must be less than far, {far:g}"
@@ -131,7 +147,10 @@ class Camera(Document):
             yield ("target",), "is where the eye is: there is no direction of view"
 
     def axes(self, middle: Array) -> Array:
-        """(3, 3): rows right, up, backward, unit and perpendicular. `middle` (3,) stands in for a target left out."""
+        """Returns the directions right, up and backward as rows (3, 3), unit and perpendicular, in world space.
+
+        middle: the middle of the scene (3,), which is the target if the key `target` is left out [scene units].
+        """
         if self.matrix is not None:
             backward, up = np.array(self.matrix)[:3, 2], np.array(self.matrix)[:3, 1]
         else:
@@ -143,7 +162,7 @@ class Camera(Document):
         backward = backward / np.linalg.norm(backward)
         right = np.cross(up, backward)
         if np.linalg.norm(right) <= 1e-9 * np.linalg.norm(up):
-            # Looking straight along `up`: any other axis will do, the least parallel one is the steadiest.
+            # The view is along `up`, so another axis has to replace it. The least parallel one loses the fewest digits.
             right = np.cross(np.eye(3)[np.argmin(np.abs(backward))], backward)
         right = right / np.linalg.norm(right)
         axes: Array = np.stack([right, np.cross(backward, right), backward]) @ self._turned.T
@@ -151,7 +170,7 @@ class Camera(Document):
 
     @property
     def _turned(self) -> Array:
-        """(3, 3): the rotation of `turn` about `up` (Rodrigues)."""
+        """The rotation matrix (3, 3) of the angle `turn` about `up`, by Rodrigues' formula."""
         x, y, z = np.array(self.up) / np.linalg.norm(self.up)
         across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
         angle = math.radians(self.turn)
@@ -160,17 +179,21 @@ class Camera(Document):
 
     @property
     def framing(self) -> bool:
-        """Whether the camera looks for the place from where the whole scene is seen."""
+        """Whether the camera chooses its own position, such that it sees the whole scene."""
         return self.fit or (self.eye is None and self.matrix is None)
 
     def view(self, points: Array, aspect: float) -> View:
-        """The camera in its place. points (N, 3): what has to be seen, or boxes round it; aspect: width over height."""
+        """Returns the view of a scene.
+
+        points: the scene's vertices, or the corners of boxes round them (N, 3) [scene units].
+        aspect: the picture's width divided by its height.
+        """
         middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
         axes = self.axes(middle)
         half_width, half_height = self.half_size(aspect)
         if self.framing:
             around = (points - middle) @ axes.T
-            # A speck far from the origin counts as large enough for float64 to tell its sides apart.
+            # A tiny scene far from the origin counts as larger than it is, so that float64 can tell its sides apart.
             least = 1e-9 * float(np.abs(middle).max())
             if np.abs(around).max() < least:
                 around = np.array([[-least] * 3, [least] * 3])
@@ -184,20 +207,30 @@ class Camera(Document):
         return View(isinstance(self, Perspective), eye, axes, half_width, half_height, near, far)
 
     def half_size(self, aspect: float) -> tuple[float, float]:
-        """Half the picture's width and height, at depth 1 where the view is perspective."""
+        """Returns half the width and half the height of the picture, at depth 1 if perspective [scene units]."""
         raise NotImplementedError
 
     def frame(self, points: Array, half_width: float, half_height: float, aspect: float) -> tuple[Array, float, float]:
-        """(eye (3,), half_width, half_height) that show the points (N, 3); all in view axes about the points' middle."""
+        """Returns (eye (3,), half_width, half_height) of a view that shows all points.
+
+        The eye and the points are in the view's axes, with the middle of the points as origin.
+        points: the points that have to be seen (N, 3) [scene units].
+        half_width, half_height: the sizes that `half_size` returns. An orthographic camera may return others.
+        aspect: the picture's width divided by its height.
+        """
         raise NotImplementedError
 
     def depth_range(self, depth: Array) -> tuple[float, float]:
-        """(near, far): as told, else a little outside of what there is."""
+        """Returns the depths (near, far) of the two planes [scene units].
+
+        They are the values of the keys `near` and `far`. If a key is left out, its plane lies just outside the scene.
+        depth: the depths of the scene's points (N,) [scene units].
+        """
         raise NotImplementedError
 
 
 class Perspective(Camera):
-    """A pinhole."""
+    """A pinhole camera."""
 
     type: Literal["perspective"] = "perspective"
     fov: Annotated[float, Field(gt=0, lt=180)] = Field(40.0, description="vertical field of view [degrees]")
@@ -207,14 +240,14 @@ class Perspective(Camera):
         return half_height * aspect, half_height
 
     def frame(self, points: Array, half_width: float, half_height: float, aspect: float) -> tuple[Array, float, float]:
-        # The eye at (x, y, z) sees a point at (a, b, c) within the picture's right edge where a - x <= half_width (z - c), and
-        # so on for the other three: each pair of edges gives the eye's place between them, and a least distance.
+        # An eye at (x, y, z) sees a point (a, b, c) inside the picture's right edge if a - x <= half_width (z - c). The other
+        # three edges give similar inequalities. Each pair of opposite edges gives one coordinate of the eye and a least z.
         eye = np.zeros(3)
         for axis, half in enumerate((half_width / MARGIN, half_height / MARGIN)):
             over, under = (float((sign * points[:, axis] + half * points[:, 2]).max()) for sign in (1, -1))
             eye[axis] = 0.5 * (over - under)
             eye[2] = max(eye[2], 0.5 * (over + under) / half)
-        # A single point, or a speck, is seen from a distance too.
+        # The eye must not lie inside a scene that is a single point or almost one.
         eye[2] = max(eye[2], float(points[:, 2].max()) + 1e-3 * float(np.ptp(points, axis=0).max()), 1e-30)
         return eye, half_width, half_height
 
@@ -222,16 +255,16 @@ class Perspective(Camera):
         deepest = float(depth.max())
         far = self.far if self.far is not None else deepest * 1.01 if deepest > 0 else 1.0
         near = self.near if self.near is not None else max(0.9 * float(depth.min()), NEAREST_SHARE * far)
-        # One of the two may be told and lie on the wrong side of what the scene suggests for the other.
+        # A plane that the scene suggests may lie beyond the plane that a key gives. Then it is computed from the key alone.
         return (near, far) if near < far else (near, 2 * near) if self.far is None else (NEAREST_SHARE * far, far)
 
 
 class Orthographic(Camera):
-    """A viewer at infinity: v is constant (lecture slide 49)."""
+    """A camera at infinity: the direction to the viewer is the same everywhere (lecture slide 49)."""
 
     type: Literal["orthographic"] = "orthographic"
     height: Annotated[Finite, Field(gt=0)] | None = Field(
-        None, description="what the picture's height spans [scene units]; left out: the whole scene"
+        None, description="height that the picture spans [scene units]; left out: enough for the whole scene"
     )
 
     def half_size(self, aspect: float) -> tuple[float, float]:
@@ -254,7 +287,7 @@ class Orthographic(Camera):
         view = super().view(points, aspect)
         if self.height is not None or self.framing:
             return view
-        # Placed, but not told how much to show: as much as it takes about the middle of the picture.
+        # The eye is given but the height is not, so the picture grows about its middle until it shows the whole scene.
         reach = np.abs((points - view.eye) @ view.axes.T).max(axis=0)
         half_height = MARGIN * max(float(reach[1]), float(reach[0]) / aspect, 1e-30)
         return View(False, view.eye, view.axes, half_height * aspect, half_height, view.near, view.far)

@@ -1,4 +1,4 @@
-"""Digest: a scene's content in 64 letters. It does not depend on where files lie or what they are called."""
+"""Digest: a hash of a scene, in which files count by their content and not by their names and folders."""
 
 from __future__ import annotations
 
@@ -13,12 +13,15 @@ from glshade.mesh.mesh import Mesh
 from glshade.scene.scene import Scene
 
 
-def digest(scene: Scene) -> str:
-    """SHA-256 of everything that the scene says, files by their content."""
+def scene_digest(scene: Scene) -> str:
+    """Returns the SHA-256 of all values of a scene, with the content of every file in place of its path: 64 hex digits.
+
+    Errors: AssetError for a mesh file, OSError for another file that cannot be read.
+    """
 
     def content(value: Any) -> Any:
         if isinstance(value, Path) and value.suffix.lower() in mesh_file.SUFFIXES:
-            # With the materials, textures and buffers that lie beside it.
+            # The model is hashed, not the file's bytes, since the model also has the materials and buffers from other files.
             parts = mesh_file.load(value).parts
             return [(part.mesh.digest, part.transform.tolist(), files(part.material)) for part in parts]
         if isinstance(value, Path):
@@ -34,7 +37,7 @@ def digest(scene: Scene) -> str:
         return value
 
     def files(material: Any) -> Any:
-        """A material of a mesh file, whose textures are named by strings."""
+        """Returns a mesh file's material with the content of its textures in place of their paths, which are strings."""
         if isinstance(material, dict):
             return {key: content(Path(item)) if key == "texture" else files(item) for key, item in material.items()}
         return material

@@ -1,4 +1,4 @@
-"""Scene files: TOML, JSON of the same shape, or a bare mesh, which is a scene too."""
+"""Scene files: scenes that are read from TOML, from JSON with the same keys, or from a mesh file alone."""
 
 from __future__ import annotations
 
@@ -15,6 +15,8 @@ from glshade.document import Document, nearest
 from glshade.errors import AssetError, SceneError
 from glshade.image.file import probe
 from glshade.mesh import file as mesh_file
+from glshade.mesh.model import Model
+from glshade.scene.models import Folders, use_models
 from glshade.scene.scene import Scene
 from glshade.textures.texture import Picture
 
@@ -24,28 +26,33 @@ if TYPE_CHECKING:
 TEXT_SUFFIXES = (".toml", ".json")
 
 
-def load(path: str | Path, overrides: Overrides = ()) -> Scene:
-    """The scene in a file, with its meshes read.
+def load(path: str | Path, overrides: Overrides = (), *, models: Folders | None = None) -> Scene:
+    """Returns the scene in a file, and reads its meshes.
 
-    A mesh file is framed by a camera, lit by the default rig and drawn in its own material. overrides: values in place of the
-    file's, in their order, by dotted keys such as "materials.body.roughness" or "objects.ball.shading"; or pairs of key and
-    text, as `--set KEY=VALUE` has them. Errors: SceneError with every fault: file, key path, what is allowed.
+    For a mesh file alone, a default camera and the default lights are chosen, and the materials are the mesh file's own.
+    path: a scene file or a mesh file.
+    overrides: values that replace those of the file, in their order: a table of dotted keys such as "materials.body.roughness"
+        or "objects.ball.shading"; or pairs of key and text, as in `--set KEY=VALUE`.
+    models: a folder, or several, with reflectance models and lights of the user's own.
+    Errors: SceneError with every fault, each with the file, the key path and the values that are allowed.
     """
+    use_models(models)
     return SceneFile(path, overrides).scene()
 
 
 class SceneFile:
-    """A scene as it is written, to be taken at any frame and through any of its cameras.
-
-    Errors: SceneError, for what cannot be read, and for overrides that lead nowhere.
-    """
+    """A scene file, which returns its scene at any frame and through any of its cameras."""
 
     def __init__(self, path: str | Path, overrides: Overrides = ()) -> None:
+        """Reads the file. path and overrides: as for `load`.
+
+        Errors: SceneError for a file that cannot be read, and for overrides whose keys name no value.
+        """
         self.path = Path(path)
         suffix = self.path.suffix.lower()
         if suffix in mesh_file.SUFFIXES:
             mesh_file.load(self.path)
-            # Its name is the key to it; what is absolute needs no folder.
+            # Overrides find the object by its name. The path is absolute, so that it is right from any folder.
             mesh = {"name": self.path.stem, "mesh": str(self.path.resolve())}
             document: Any = {"description": self.path.name, "objects": [mesh], "film": {"samples": 4, "background": BACKDROP}}
         elif suffix in TEXT_SUFFIXES:
@@ -55,26 +62,31 @@ class SceneFile:
             raise SceneError(f"{self.path}: {suffix or 'no extension'} is neither a scene nor a mesh; known: {known}")
         self.document = _overridden(document, overrides, self.path)
         self._as_written = self.document is document
-        # Textures' files that could be read, and the last scene whose files all could.
+        # The texture files that are known to be readable.
         self._probed: set[Path] = set()
+        # The last scene whose files were all readable.
         self._checked: Scene | None = None
-        # By camera: the last scene, and it through that camera.
+        # The mesh files of the last scene that was checked. This keeps them in memory from frame to frame, whatever their size.
+        self._models: dict[Path, Model] = {}
+        # name of a further camera -> (the last scene that was asked for with it, the same scene with this camera).
         self._seen: dict[str, tuple[Scene, Scene]] = {}
 
     @cached_property
     def _written(self) -> Scene:
-        """The scene as it is written."""
+        """The scene without its animation. Errors: SceneError."""
         return parse(self.document, self.path)
 
     @property
     def cameras(self) -> tuple[str, ...]:
-        """The names of its cameras."""
+        """The names of the scene's further cameras. Errors: SceneError."""
         return tuple(self._written.cameras)
 
     def scene(self, frame: float | None = None, camera: str | None = None) -> Scene:
-        """The scene at a frame, as it is written where that is None, through one of its cameras.
+        """Returns the scene.
 
-        Errors: SceneError with every fault; those that the file alone does not have say that they came with --set.
+        frame: the frame of the animation; None: the scene without its animation.
+        camera: the name of one of the scene's further cameras; None: the scene's own camera.
+        Errors: SceneError with every fault. A fault that the file has only with the overrides is marked "(from --set)".
         """
         try:
             return self._scene(frame, camera)
@@ -98,7 +110,7 @@ class SceneFile:
         return scene
 
     def _at(self, frame: float) -> Scene:
-        """The scene at a frame: what its tracks leave alone is not validated again, and stays the same object."""
+        """Returns the scene at a frame. Values that no track changes are not validated again and stay the same objects."""
         written = self._written
         if not written.animation:
             return written
@@ -112,21 +124,26 @@ class SceneFile:
         return parse(_merged(written, self.document, document), self.path)
 
     def _through(self, camera: str, scene: Scene) -> Scene:
-        """The scene seen by one of its cameras; the same object for the same scene."""
+        """Returns the scene with one of its further cameras; the same object for the same scene."""
         if camera not in self._seen or self._seen[camera][0] is not scene:
             self._seen[camera] = scene, scene.model_copy(update={"camera": scene.cameras[camera]})
         return self._seen[camera][1]
 
     def _check(self, scene: Scene) -> None:
-        """Looks at the files that the scene names: meshes always, textures where they are new."""
+        """Reads the mesh files that the scene names, and the headers of texture files that are new. Errors: SceneError."""
         problems: list[str] = []
-        meshes: dict[Path, tuple[str, ...]] = {}
+        models: dict[Path, Model] = {}
+        faults: dict[Path, tuple[str, ...]] = {}
         for index, item in enumerate(scene.objects):
             if not isinstance(item.mesh, Path):
                 continue
-            if item.mesh not in meshes:
-                meshes[item.mesh] = _faults(item.mesh)
-            problems.extend(f"{self.path}: objects[{index}].mesh: {problem}" for problem in meshes[item.mesh])
+            if item.mesh not in models and item.mesh not in faults:
+                try:
+                    models[item.mesh] = mesh_file.load(item.mesh)
+                except SceneError as error:
+                    faults[item.mesh] = error.problems
+            problems.extend(f"{self.path}: objects[{index}].mesh: {problem}" for problem in faults.get(item.mesh, ()))
+        self._models = models
         for place, picture in _pictures(scene, self._checked):
             if picture in self._probed:
                 continue
@@ -140,17 +157,11 @@ class SceneFile:
         self._checked = scene
 
 
-def _faults(mesh: Path) -> tuple[str, ...]:
-    """What is wrong with a mesh's file."""
-    try:
-        mesh_file.load(mesh)
-    except SceneError as error:
-        return error.problems
-    return ()
-
-
 def _merged(written: Scene, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
-    """`after`, with what it shares with `before` as it was validated in `written`."""
+    """Returns the table `after`, with validated values in place of those that it shares with the table `before`.
+
+    written: the scene that was validated from `before`.
+    """
     merged: dict[str, Any] = {}
     for key, value in after.items():
         known, old = getattr(written, key), before.get(key)
@@ -166,8 +177,11 @@ def _merged(written: Scene, before: Mapping[str, Any], after: Mapping[str, Any])
 
 
 def _overridden(document: Any, overrides: Overrides, path: Path) -> Any:
-    """The same document where there is nothing to override. Errors: SceneError for a key that leads nowhere."""
-    # What is no table is a fault of the file, and reported as such.
+    """Returns the document with its overrides; the same object where there are none.
+
+    Errors: SceneError for every key that names no value.
+    """
+    # A document that is not a table is reported later, as a fault of the file.
     if not overrides or not isinstance(document, Mapping):
         return document
     from glshade.scene.override import OverrideError, apply, pairs
@@ -188,10 +202,10 @@ def _overridden(document: Any, overrides: Overrides, path: Path) -> Any:
 
 
 def _pictures(scene: Scene, known: Scene | None) -> Iterator[tuple[str, Path]]:
-    """(key path, file) of every texture of the materials that `known` has not."""
-    seen = {id(material) for _, material in _materials(known)} if known else set()
+    """Yields (key path, file) for every texture of the scene, except in materials that it shares with the scene `known`."""
+    shared = {id(material) for _, material in _materials(known)} if known else set()
     for place, material in _materials(scene):
-        if isinstance(material, Document) and id(material) not in seen:
+        if isinstance(material, Document) and id(material) not in shared:
             for name in type(material).model_fields:
                 value = getattr(material, name)
                 if isinstance(value, Picture):
@@ -199,17 +213,22 @@ def _pictures(scene: Scene, known: Scene | None) -> Iterator[tuple[str, Path]]:
 
 
 def _materials(scene: Scene) -> Iterator[tuple[str, Any]]:
-    """(key path, material) of all that the scene lists, and all that its objects have of their own."""
+    """Yields (key path, material) for the scene's table of materials and for the material of every object."""
     yield from ((f"materials.{name}", material) for name, material in scene.materials.items())
     yield from ((f"objects[{index}].material", item.material) for index, item in enumerate(scene.objects))
 
 
-# Behind a bare mesh: a dark grey that light and dark objects both stand out from.
+# The background of a scene that is a mesh file alone: a dark grey, from which light and dark objects both stand out.
 BACKDROP = (0.05, 0.055, 0.065)
 
 
 def parse(data: Any, path: Path) -> Scene:
-    """The scene of a table; relative files start at the folder of `path`. Errors: SceneError with every fault."""
+    """Returns the scene that a table describes.
+
+    data: the table, as read from a file.
+    path: the scene file, which messages name; the paths in the table are relative to its folder.
+    Errors: SceneError with every fault.
+    """
     try:
         return Scene.model_validate(data, context={"folder": path.parent.resolve()})
     except ValidationError as error:
@@ -217,6 +236,7 @@ def parse(data: Any, path: Path) -> Scene:
 
 
 def _read(path: Path) -> Any:
+    """Returns the content of a TOML or JSON file. Errors: SceneError."""
     try:
         text = path.read_bytes().decode("utf-8-sig")
     except FileNotFoundError:
@@ -232,6 +252,6 @@ def _read(path: Path) -> Any:
 
 
 def _key_path(loc: tuple[str | int, ...]) -> str:
-    """`objects[2].material.kd: `"""
+    """Returns the start of a message, such as `objects[2].material.kd: `."""
     text = "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in loc)
     return text.lstrip(".") + ": " if text else ""

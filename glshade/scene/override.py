@@ -1,4 +1,4 @@
-"""Override: one value of a scene file put in the place of another, by a dotted key: `materials.body.roughness`."""
+"""Override: values that replace those of a scene file, each by a dotted key such as `materials.body.roughness`."""
 
 from __future__ import annotations
 
@@ -10,25 +10,28 @@ from typing import Any
 from glshade.document import nearest
 from glshade.presets import PRESETS
 
-# Dotted keys and their values; or, as a command line has them, pairs of key and text, which may say a key more than once.
+# A table of dotted keys and values; or pairs of key and text as on a command line, where a key may come several times.
 Overrides = Mapping[str, Any] | Iterable[tuple[str, Any]]
 
 BARE = r"""[^\s.="'[\]][^.="[\]]*"""
 PART = rf"""\s*(?:"[^"]*"\s*|'[^']*'\s*|{BARE})"""
-# Messages have `objects[0].material`; what is pasted from them is a key, too.
+# Messages write `objects[0].material`, so that a key pasted from a message works too.
 ITEM = r"\[[0-9]+\]"
 KEY = re.compile(rf"{PART}(?:\.{PART}|{ITEM})*")
 ASSIGNMENT = re.compile(rf"({KEY.pattern})=(.*)", re.DOTALL)
-# What a scene has a list of, even where it is left out: an item of it cannot be made from a name.
+# The scene's keys that hold lists. If a scene leaves such a list out, an override cannot add an item to it.
 LISTS = frozenset({"objects", "lights", "animation"})
 
 
 class OverrideError(ValueError):
-    """A key that leads nowhere in this document."""
+    """A dotted key does not lead to a value of the document."""
 
 
 def split(text: str) -> tuple[str, str]:
-    """Key and text of `KEY=VALUE`. Errors: ValueError where it is none, or where the text is no value."""
+    """Returns the key and the text of the value in `KEY=VALUE`.
+
+    Errors: ValueError for another form of text, or for a text that is not a value.
+    """
     match = ASSIGNMENT.fullmatch(text)
     if not match or not match[2].strip():
         raise ValueError(f"{text!r} is not KEY=VALUE such as materials.body.roughness=0.3")
@@ -38,109 +41,125 @@ def split(text: str) -> tuple[str, str]:
 
 
 def parse(text: str) -> Any:
-    """The value of a text: TOML's, or, for a bare word that is none, the word. Errors: ValueError."""
+    """Returns the value of a text in TOML. A bare word that is not TOML is returned as a string.
+
+    Errors: ValueError for a text that starts like a TOML value but is not one, or that holds several.
+    """
     text = text.strip()
     try:
         table = tomllib.loads(f"value = {text}\n")
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         if not text or text[0] in "[{\"'":
-            # The column that follows counts from another beginning.
+            # The position at the end of TOML's message is cut off, because it counts the prefix "value = ".
             raise ValueError(f"{_short(text)} is not a value of TOML: {str(error).partition(' (at')[0]}") from None
         return text
     if len(table) > 1:
-        raise ValueError(f"{_short(text)} is not one value, but more")
+        raise ValueError(f"{_short(text)} is not a single value")
     return table["value"]
 
 
 def pairs(overrides: Overrides) -> list[tuple[str, Any]]:
-    """Keys and values. What stands beside a key in a mapping is the value; in a pair, a string is a text that says it.
+    """Returns the keys and values of overrides. A mapping holds the values themselves; a string in a pair is parsed.
 
-    Errors: ValueError for a text that is no value.
+    Errors: ValueError for a text that is not a value.
     """
     if isinstance(overrides, Mapping):
         return list(overrides.items())
-    found = []
+    parsed = []
     for key, text in overrides:
         try:
-            found.append((key, parse(text) if isinstance(text, str) else text))
+            parsed.append((key, parse(text) if isinstance(text, str) else text))
         except ValueError as error:
             raise ValueError(f"{key}: {error}") from None
-    return found
+    return parsed
 
 
 def apply(document: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
-    """The document with the value at the key; what was given is left as it is.
+    """Returns a copy of the document in which the key has the value.
 
-    A part of the key is a table's key, or in a list an item's `name` or its number; a name with one of . = [ ] in it stands in
-    quotes: `materials."v1.2".kd`. A table that is not there is made; so is the material of a preset's name, from the preset.
+    Each part of the key is a table's key, or in a list an item's `name` or number. A name with one of . = [ ] in it stands in
+    quotes: `materials."v1.2".kd`. A missing table is added; a missing material with a preset's name is added as that preset.
     Errors: OverrideError.
     """
     if not KEY.fullmatch(key):
         raise OverrideError(f"{key!r} is not a dotted key such as materials.body.roughness")
-    found = map(str.strip, re.findall(f"{PART}|{ITEM}", key))
-    parts = tuple(part[1:-1] if part[0] in "\"'[" else part for part in found)
+    written = map(str.strip, re.findall(f"{PART}|{ITEM}", key))
+    parts = tuple(part[1:-1] if part[0] in "\"'[" else part for part in written)
     result = _put(document, parts, (), value)
     assert isinstance(result, dict)
     return result
 
 
 def _put(node: Any, parts: tuple[str, ...], before: tuple[str, ...], value: Any) -> Any:
+    """Returns a copy of a part of the document with a value set. Errors: OverrideError.
+
+    node: the table, list or value at `before`; None where there is none.
+    parts: the parts of the key that lead on from the node.
+    before: the parts of the key that lead to the node.
+    value: the new value.
+    """
     if not parts:
         return value
     part, rest = parts[0], parts[1:]
-    here = (*before, part)
+    path = (*before, part)
     if isinstance(node, list | tuple):
-        index = _index(node, here)
-        return [_put(item, rest, here, value) if i == index else item for i, item in enumerate(node)]
+        index = _index(node, path)
+        return [_put(item, rest, path, value) if i == index else item for i, item in enumerate(node)]
     if node is None:
         if len(before) == 1 and before[0] in LISTS:
-            raise OverrideError(f"{_key(here)}: the scene lists no {before[0]}")
+            raise OverrideError(f"{_key(path)}: the scene lists no {before[0]}")
         node = {}
     if isinstance(node, str):
-        node = _unfolded(node, here)
+        node = _unfolded(node, path)
     if not isinstance(node, Mapping):
-        raise OverrideError(f"{_key(here)}: {_key(before)} is {_short(node)}, not a table")
+        raise OverrideError(f"{_key(path)}: {_key(before)} is {_short(node)}, not a table")
     below = node.get(part)
     if below is None and rest and before == ("materials",):
         if part not in PRESETS:
-            raise OverrideError(f'{_key(here)}: no material or preset is named "{part}"{nearest(part, {*node, *PRESETS})}')
+            raise OverrideError(f'{_key(path)}: no material or preset is named "{part}"{nearest(part, {*node, *PRESETS})}')
         below = {"preset": part}
-    return {**node, part: _put(below, rest, here, value)}
+    return {**node, part: _put(below, rest, path, value)}
 
 
-def _unfolded(word: str, here: tuple[str, ...]) -> dict[str, Any]:
-    """The table that a word stands for: `shape = "cube"`; a material's name stands for what others may use too."""
-    *before, part = here
+def _unfolded(word: str, path: tuple[str, ...]) -> dict[str, Any]:
+    """Returns the table that a word stands for, such as that of `shape = "cube"`. Errors: OverrideError.
+
+    A material's name is refused, because other objects may use the same material.
+    word: the value at the parent of the path.
+    path: the parts of the key that was asked for.
+    """
+    *before, part = path
     if before[-1] == "shape":
         return {"type": word}
     if before[-1] == "material":
         instead = _key(("materials", word, part))
-        raise OverrideError(f'{_key(here)}: the material is named "{word}"; set {instead} in its place')
-    raise OverrideError(f"{_key(here)}: {_key(before)} is {_short(word)}, not a table")
+        raise OverrideError(f'{_key(path)}: the material is named "{word}"; set {instead} in its place')
+    raise OverrideError(f"{_key(path)}: {_key(before)} is {_short(word)}, not a table")
 
 
-def _index(items: list[Any] | tuple[Any, ...], here: tuple[str, ...]) -> int:
-    part = here[-1]
+def _index(items: list[Any] | tuple[Any, ...], path: tuple[str, ...]) -> int:
+    """Returns the index of the item that the last part of the path names or numbers. Errors: OverrideError."""
+    part = path[-1]
     names = [item.get("name") if isinstance(item, Mapping) else None for item in items]
     if part in names:
         return names.index(part)
     if not items:
-        raise OverrideError(f"{_key(here)}: there are none, {_key(here[:-1])} is empty")
+        raise OverrideError(f"{_key(path)}: {_key(path[:-1])} is empty")
     if not re.fullmatch("[0-9]+", part):
         known = [name for name in names if isinstance(name, str)]
-        raise OverrideError(f'{_key(here)}: none is named "{part}"{nearest(part, [*known, f"0 to {len(items) - 1}"])}')
-    # Only a count has few digits enough for int().
+        raise OverrideError(f'{_key(path)}: no item is named "{part}"{nearest(part, [*known, f"0 to {len(items) - 1}"])}')
+    # The length is compared first, because int() refuses a text of several thousand digits.
     if len(part) > len(str(len(items))) or int(part) >= len(items):
-        raise OverrideError(f"{_key(here)}: there are {len(items)}, counted from 0")
+        raise OverrideError(f"{_key(path)}: the list has {len(items)} items, numbered from 0")
     return int(part)
 
 
 def _key(parts: Iterable[str]) -> str:
-    """The dotted key of its parts."""
+    """Returns the dotted key of its parts, with quotes where a part needs them."""
     return ".".join(part if re.fullmatch(BARE, part) else f'"{part}"' for part in parts)
 
 
 def _short(value: object) -> str:
-    """As Python writes it, cut where it would drown the message."""
+    """Returns the value as Python writes it, cut to 40 characters so that the message stays readable."""
     text = repr(value)
     return text if len(text) <= 40 else f"{text[:36]} ..."

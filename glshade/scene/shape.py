@@ -1,13 +1,16 @@
-"""Shape: a primitive as a scene names it. The meshes themselves are made in primitives.py."""
+"""Shape: the keys of primitives in a scene file. glshade/mesh/primitives.py makes their meshes."""
 
-from functools import lru_cache
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from glshade.document import Document
+from glshade.lru import WeakLru
 from glshade.mesh import primitives
 from glshade.mesh.mesh import Mesh
+
+# The most memory that the cache of meshes may take beside the meshes that are in use [bytes].
+REMEMBERED = 64 << 20
 
 Segments = Annotated[int, Field(ge=3, le=4096)]
 
@@ -18,64 +21,65 @@ class Shape(Document):
     type: str
 
     def mesh(self) -> Mesh:
-        """Its mesh; the same object for equal shapes."""
-        return _mesh(self)
+        """Returns the mesh of the shape. Equal shapes share one Mesh for as long as it is in use or in the LRU cache."""
+        return _meshes.find(self, self._made, lambda mesh: mesh.nbytes)
+
+    def _made(self) -> Mesh:
+        return primitives.PRIMITIVES[self.type](**self.model_dump(exclude={"type"}))
 
 
-@lru_cache(maxsize=256)
-def _mesh(shape: Shape) -> Mesh:
-    return primitives.PRIMITIVES[shape.type](**shape.model_dump(exclude={"type"}))
+_meshes: WeakLru[Shape, Mesh] = WeakLru(REMEMBERED)
 
 
 class Sphere(Shape):
-    """Radius 1, with poles on the y axis and texture coordinates."""
+    """A sphere of radius 1 with texture coordinates, whose poles lie on the y axis."""
 
     type: Literal["sphere"] = "sphere"
-    segments: Segments = Field(96, description="round the y axis")
-    rings: Annotated[int, Field(ge=2, le=4096)] = Field(48, description="from pole to pole")
+    segments: Segments = Field(96, description="number of segments round the y axis")
+    rings: Annotated[int, Field(ge=2, le=4096)] = Field(48, description="number of rings from pole to pole")
 
 
 class Icosphere(Shape):
-    """Radius 1, of triangles of almost one size."""
+    """A sphere of radius 1 whose triangles have almost the same size."""
 
     type: Literal["icosphere"] = "icosphere"
-    subdivisions: Annotated[int, Field(ge=0, le=9)] = Field(4, description="20 x 4^n triangles")
+    subdivisions: Annotated[int, Field(ge=0, le=9)] = Field(4, description="n: the sphere has 20 x 4^n triangles")
 
 
 class Cube(Shape):
-    """From -1 to 1 along each axis."""
+    """A cube from -1 to 1 along each axis."""
 
     type: Literal["cube"] = "cube"
 
 
 class Plane(Shape):
-    """y = 0, facing up, from -1 to 1."""
+    """A square at y = 0 that faces up, from -1 to 1 along x and z."""
 
     type: Literal["plane"] = "plane"
-    segments: Annotated[int, Field(ge=1, le=4096)] = Field(1, description="along each side")
+    segments: Annotated[int, Field(ge=1, le=4096)] = Field(1, description="number of segments along each side")
 
 
 class Torus(Shape):
-    """Round the y axis; the tube's middle is a circle of radius 1."""
+    """A torus round the y axis. The middle of its tube is a circle of radius 1."""
 
     type: Literal["torus"] = "torus"
     minor: Annotated[float, Field(gt=0, lt=1)] = Field(0.4, description="radius of the tube")
-    segments: Segments = Field(96, description="round the y axis")
-    sides: Segments = Field(48, description="round the tube")
+    segments: Segments = Field(96, description="number of segments round the y axis")
+    sides: Segments = Field(48, description="number of segments round the tube")
 
 
 class Cylinder(Shape):
-    """Radius 1, from y = -1 to 1, with caps."""
+    """A cylinder of radius 1 with caps, from y = -1 to y = 1."""
 
     type: Literal["cylinder"] = "cylinder"
-    segments: Segments = Field(64, description="round the y axis")
+    segments: Segments = Field(64, description="number of segments round the y axis")
 
 
 class Cone(Shape):
-    """Radius 1 at y = -1, tip at y = 1, with a cap."""
+    """A cone with a cap of radius 1 at y = -1 and its tip at y = 1."""
 
     type: Literal["cone"] = "cone"
-    segments: Segments = Field(64, description="round the y axis")
+    segments: Segments = Field(64, description="number of segments round the y axis")
 
 
 SHAPES: dict[str, type[Document]] = {

@@ -1,1 +1,1 @@
-"""Textures: what a scene may say of a picture on a surface, and the texels that are uploaded."""
+"""Textures: the keys of textures in a scene file, and the texels and mipmaps that are uploaded."""

@@ -1,4 +1,4 @@
-"""Texels: what a picture file becomes before it is uploaded. Both renderers are given the same."""
+"""Texels: the arrays that are read from picture files and uploaded as textures, the same for both renderers."""
 
 from __future__ import annotations
 
@@ -17,9 +17,12 @@ Pixels = NDArray[np.float32]
 
 @dataclass(frozen=True)
 class Texels:
-    """Which picture, and how it is read: equal ones are one texture.
+    """A picture file and the way in which it is read. Equal Texels share one texture on the GPU.
 
-    given: its wrap modes as the material has them. heights: what is read are heights, what is uploaded are normals.
+    path: the picture file.
+    given: the wrap modes that the material asks for, along u and along v.
+    encoding: the encoding of the file's colours.
+    heights: whether the file holds heights, from which normals are made for the upload.
     """
 
     path: Path
@@ -29,40 +32,47 @@ class Texels:
 
     @property
     def span(self) -> tuple[int, int]:
-        """Along u and along v: how often the unit of texture coordinates goes into the texels.
+        """How many units of texture coordinates the texels span, along u and along v: 1 or 2.
 
-        A mirrored hill falls where the hill itself rises, so the normals of heights lie side by side with their mirror image.
+        The slopes of a mirrored height map have the opposite sign. So its normals are stored beside those of its mirror image,
+        and the texels span two units.
         """
         u, v = (2 if self.heights and mode == "mirror" else 1 for mode in self.given)
         return u, v
 
     @property
     def wrap(self) -> tuple[WrapMode, WrapMode]:
-        """The modes by which the texels go on, u and v."""
+        """The wrap modes of the uploaded texels, along u and along v. Texels that include a mirror image only repeat."""
         u, v = ("repeat" if times == 2 else mode for times, mode in zip(self.span, self.given, strict=True))
         return u, v
 
     def read(self) -> Pixels:
-        """(H, W, 4) float32, straight alpha, row 0 at the bottom, where GL has it. Errors: AssetError."""
+        """Returns the texels (H, W, 4) float32, linear, with straight alpha. Row 0 is the bottom row, as OpenGL expects.
+
+        Errors: AssetError.
+        """
         pixels = np.ascontiguousarray(picture_file.read(self.path, self.encoding)[0][::-1])
         return normals(pixels[..., 0], self.given) if self.heights else pixels
 
 
-def texels(material: Any, name: str) -> Texels:
-    """How the picture that is the material's `name` is read."""
+def texels_of(material: Any, name: str) -> Texels:
+    """Returns the Texels of the picture that a material has under the key `name`."""
     picture: Picture = getattr(material, name)
     if not isinstance(picture, Texture):
         return Texels(picture.texture, picture.wrap, heights=isinstance(picture, BumpMap))
-    # Numbers are no colours: nobody encodes them.
+    # Parameters that are numbers are stored as they are: only colours are sRGB-encoded.
     linear = picture.encoding == "auto" and not type(material).is_colour(name)
     return Texels(picture.texture, picture.wrap, "linear" if linear else picture.encoding)
 
 
 def normals(heights: Pixels, wrap: tuple[WrapMode, WrapMode]) -> Pixels:
-    """(H, W, 4): tangent-space normals (1 + n) / 2 of heights (H, W) that count the picture's width as 1. Row 0 is the bottom.
+    """Returns the tangent-space normals of a height map, as texels (1 + n) / 2 (H, W, 4). Row 0 is the bottom row.
 
-    n = (-dz/dx, -dz/dy, 1), not unit: its x and y are linear in the heights, so that the mean of normals, by which textures
-    are made smaller, is the normal of the mean heights. Twice as wide or high where mirrored (`Texels.span`).
+    For the height z, n = (-dz/dx, -dz/dy, 1), which is not made unit. Its x and y are linear in the heights, so that a mipmap's
+    mean of normals is the normal of the mean heights. The result is twice as wide or high where the heights are mirrored
+    (`Texels.span`).
+    heights: the heights (H, W) [widths of the picture].
+    wrap: the wrap modes along u and along v.
     """
     z = heights.astype(np.float64)
     for axis, mode in ((1, wrap[0]), (0, wrap[1])):
@@ -70,11 +80,11 @@ def normals(heights: Pixels, wrap: tuple[WrapMode, WrapMode]) -> Pixels:
             z = np.concatenate([z, np.flip(z, axis)], axis)
     slopes = []
     for axis, mode in ((1, wrap[0]), (0, wrap[1])):
-        # Two texels lie between the ends of a difference.
+        # The central difference spans two texels.
         slope = (np.roll(z, -1, axis) - np.roll(z, 1, axis)) * heights.shape[1] / 2
         if mode == "clamp":
-            # The border goes on as it is for ever, and so would its slope.
+            # Beyond the border a clamped height stays constant, so the slope at the border is 0.
             np.moveaxis(slope, axis, 0)[[0, -1]] = 0
         slopes.append(slope)
-    one = np.ones_like(z)
-    return np.stack([(1 - slopes[0]) / 2, (1 - slopes[1]) / 2, one, one], axis=-1).astype(np.float32)
+    ones = np.ones_like(z)
+    return np.stack([(1 - slopes[0]) / 2, (1 - slopes[1]) / 2, ones, ones], axis=-1).astype(np.float32)

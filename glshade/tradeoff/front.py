@@ -1,4 +1,4 @@
-"""Front: which points are worth having. One is dominated where another is faster and no worse, beyond what noise explains."""
+"""Front: the settings that no other setting dominates. To dominate means to be better in time or error and worse in neither."""
 
 from __future__ import annotations
 
@@ -8,7 +8,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Timing:
-    """Of one setting [s]: the median of the repetitions, and the range in which it would lie nineteen times of twenty."""
+    """The time of one setting.
+
+    median: the median of repeated timings [s].
+    low, high: the range in which the median would lie in 19 of 20 measurements [s].
+    """
 
     median: float
     low: float
@@ -16,17 +20,22 @@ class Timing:
 
 
 def ties(one: Timing, other: Timing) -> bool:
-    """Whether two timings cannot be told apart: their ranges overlap."""
+    """Returns whether two timings cannot be told apart, because their ranges overlap."""
     return one.low <= other.high and other.low <= one.high
 
 
 def dominated(timings: Sequence[Timing], errors: Sequence[float]) -> list[int | None]:
-    """For each point the one on the front that dominates it, None for those on the front.
+    """Returns for each of N points the index of the point on the front that dominates it, None for points on the front.
 
-    i dominates j where it is better and not slower beyond the ranges, or as good and faster beyond them. Points that are
-    dominated dominate nothing, else a chain of ties would leave only the slowest. Of several, the fastest is named.
+    A point dominates another one if its error is smaller and it is not slower, or if the errors are equal and it is faster.
+    Times whose ranges overlap count as equal. Only points on the front dominate others: if dominated points did so too, a chain
+    of points with overlapping ranges could leave only the slowest one on the front. If several points dominate one, the index
+    is that of the fastest of them.
+
+    timings: the N times.
+    errors: the N errors, in any unit.
     """
-    found: list[int | None] = [None] * len(timings)
+    dominators: list[int | None] = [None] * len(timings)
     front: list[int] = []
     for j in sorted(range(len(timings)), key=lambda j: (errors[j], timings[j].median)):
         by = []
@@ -36,7 +45,7 @@ def dominated(timings: Sequence[Timing], errors: Sequence[float]) -> list[int | 
             if not slower if errors[i] < errors[j] else apart and not slower:
                 by.append(i)
         if by:
-            found[j] = min(by, key=lambda i: (timings[i].median, errors[i]))
+            dominators[j] = min(by, key=lambda i: (timings[i].median, errors[i]))
         else:
             front.append(j)
-    return found
+    return dominators

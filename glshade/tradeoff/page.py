@@ -1,4 +1,4 @@
-"""Page: a study written down: one page that holds it all, its numbers as JSON and CSV, and the front's pictures beside it."""
+"""Page: writes a study as a self-contained HTML page, with its numbers as JSON and CSV and the front's pictures beside it."""
 
 from __future__ import annotations
 
@@ -33,35 +33,44 @@ if TYPE_CHECKING:
     from glshade.gl.renderer import Renderer
 
 Array = NDArray[Any]
-SAID = {
+# metric -> its meaning
+METRIC_MEANINGS = {
     "max_abs": "largest error of linear light",
     "rmse": "root mean square of errors of linear light",
-    "p999": "error that 99.9 % of the pixels stay within",
-    "codes": "8-bit sRGB codes that are others",
-    "flip": "mean of FLIP, what the eye notices",
+    "p999": "error that 99.9 % of the pixels do not exceed",
+    "codes": "share of 8-bit sRGB codes that differ",
+    "flip": "mean of FLIP, an estimate of visible differences",
 }
-# What each kind of error is, for the heads of columns.
-KINDS_SAID = {
-    "model": "another reflection",
+# kind of error -> its meaning, for the headings of columns
+KIND_MEANINGS = {
+    "model": "approximate reflection",
     "sampling": "shaded in fewer places",
-    "arithmetic": "float32 and its shortcuts",
-    "storage": "digits kept",
+    "arithmetic": "float32, faster forms",
+    "storage": "format of the picture",
 }
-# Pictures within the page are this wide at most [pixels].
+# The largest width of the pictures in the page [pixels].
 WIDTH = 320
-# What a page may weigh [bytes], so that it can be mailed, and what a point without pictures weighs.
+# The largest size of a page, which is small enough for e-mail, and the size of one point without its pictures [bytes].
 PAGE, POINT = 4_500_000, 4_000
-# The chart [SVG units]: its size, and what lies around the plot: left, right, top, bottom.
-CHART, AROUND = (760.0, 700.0), (66.0, 20.0, 34.0, 48.0)
-# Where the slowest takes this many times the fastest's time, times are shown by their logarithm.
+# The width and height of a chart, and the margins around its plot: left, right, top, bottom [SVG units].
+CHART, MARGINS = (760.0, 700.0), (66.0, 20.0, 34.0, 48.0)
+# A logarithmic axis has no place for errors of zero and infinity. Each of them has a separate strip of the chart of this height
+# [SVG units].
+LANE = 26.0
+# The axis of times is logarithmic where the slowest time is more than this many times the fastest.
 WIDE = 8.0
-# Bars of errors begin here: below float32's step at 1 nothing is left to see.
+# The error at which bars have no length. It is smaller than the rounding error of a float32 value near 1.
 FAINTEST = 1e-8
 
 
 @dataclass(frozen=True)
 class Rank:
-    """A place on the front. number: from the fastest on, from 1; tie: whether it cannot be told apart from the one before."""
+    """The place of a point on the front, when the front is sorted by time.
+
+    number: the place, counted from 1 for the fastest; ties share a number.
+    index: the index of the point in the study.
+    tie: True if time and error equal those of the place before.
+    """
 
     number: int
     index: int
@@ -69,24 +78,25 @@ class Rank:
 
 
 def ranks(study: Study, metric: str) -> list[Rank]:
-    """The front from the fastest to the slowest; ties share a number."""
+    """Returns the front of a study by a metric, from the fastest point to the slowest."""
     points = study.points
     front = [i for i, by in enumerate(study.front(metric)) if by is None]
     front.sort(key=lambda i: (points[i].timing.median, points[i].error(metric)))
-    found: list[Rank] = []
+    places: list[Rank] = []
     for i in front:
-        before = points[found[-1].index] if found else None
+        before = points[places[-1].index] if places else None
         tie = before is not None and ties(before.timing, points[i].timing) and before.error(metric) == points[i].error(metric)
-        found.append(Rank(found[-1].number + (not tie) if found else 1, i, tie))
-    return found
+        number = places[-1].number if places else 0
+        places.append(Rank(number if tie else number + 1, i, tie))
+    return places
 
 
-def shown(value: float, metric: str = "max_abs") -> str:
-    """An error in few letters: 0.0123, 8.2e-6; codes in percent."""
+def error_text(value: float, metric: str = "max_abs") -> str:
+    """Returns an error as a short text such as 0.0123 or 8.2e-6. Errors by the metric `codes` are in percent."""
     if not math.isfinite(value):
         return "not finite"
     if metric == "codes":
-        # Without an exponent: codes are few or many, and one of ten million pixels is 0.00001 percent.
+        # Percentages are written without an exponent, however small they are: one pixel of ten million is 0.00001%.
         return np.format_float_positional(value * 100, 3 if value > 0.1 else 2, fractional=False, trim="-") + "%"
     if value == 0 or value >= 1e-3:
         return f"{value:.3g}"
@@ -95,20 +105,28 @@ def shown(value: float, metric: str = "max_abs") -> str:
 
 
 def milliseconds(seconds: float) -> str:
-    """[ms] with three digits: 12.3, 1.23, 0.123."""
+    """Returns a time [s] as a text in milliseconds with three digits, such as 12.3, 1.23 or 0.123."""
     return f"{seconds * 1e3:#.3g}".rstrip(".")
 
 
 def reason(point: Point, other: Point, metric: str) -> str:
-    """Why `other` dominates the point."""
-    mine, its = point.error(metric), other.error(metric)
+    """Returns the reason why `other` dominates `point`, in words."""
+    own_error, other_error = point.error(metric), other.error(metric)
     pace = "as fast" if ties(point.timing, other.timing) else f"{point.timing.median / other.timing.median:.2g} times as fast"
-    return f"{pace}, " + ("no less exact" if mine == its else f"{metric} {shown(its, metric)}")
+    return f"{pace}, " + ("no less exact" if own_error == other_error else f"{metric} {error_text(other_error, metric)}")
 
 
 def write(folder: Path, study: Study, scene: Scene, renderer: Renderer, metric: str = "max_abs") -> Path:
-    """Writes index.html, tradeoff.json, tradeoff.csv, and pictures/ with the picture and the error map of all that is on a
-    front. metric: the one that the page begins with. Returns the page. Errors: GlshadeError."""
+    """Writes a study into a folder and returns the path of its index.html.
+
+    The files are index.html, tradeoff.json and tradeoff.csv. The folder pictures/ gets the picture and the error map of each
+    point that is on the front by some metric.
+
+    scene: the scene of the study.
+    renderer: draws the pictures.
+    metric: the metric that the page shows first.
+    Errors: GlshadeError where a file cannot be written.
+    """
     pictures = folder / "pictures"
     try:
         pictures.mkdir(parents=True, exist_ok=True)
@@ -122,7 +140,7 @@ def write(folder: Path, study: Study, scene: Scene, renderer: Renderer, metric: 
 
 
 def table(study: Study) -> str:
-    """CSV: one row a setting."""
+    """Returns a study as CSV, with a row for each setting."""
     text = io.StringIO()
     out = csv.writer(text, lineterminator="\n")
     knobs = [f.name for f in fields(Setting)]
@@ -140,19 +158,23 @@ def table(study: Study) -> str:
 
 
 def html(study: Study, scene: Scene, metric: str, pictures: dict[int, dict[str, str]]) -> str:
-    """The page. pictures: of points by their numbers: JPEG `picture` and `error` in base64, and `file`, its name beside the
-    page, each where there is one."""
+    """Returns the page.
+
+    metric: the metric that the page shows first.
+    pictures: index of a point -> its pictures, for points that have some: `picture` and `error` (the error map) are JPEG files
+        in base64, and `file` is the name of the PNG file in pictures/ without the suffix.
+    """
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    room = Environment(
+    environment = Environment(
         loader=FileSystemLoader(Path(__file__).parent),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    # The kinds of error stand in the order in which they are told apart.
-    room.policies["json.dumps_kwargs"] = {"sort_keys": False}
+    # Do not sort the kinds of errors: their order has a meaning, because each kind builds on the one before.
+    environment.policies["json.dumps_kwargs"] = {"sort_keys": False}
     fronts = {name: study.front(name) for name in METRICS}
     data = [
         {
@@ -160,8 +182,8 @@ def html(study: Study, scene: Scene, metric: str, pictures: dict[int, dict[str, 
             "rate": p.setting.shading,
             "time": [p.timing.median, p.timing.low, p.timing.high],
             "vertices": p.vertices,
-            "total": {m: shown(p.error(m), m) for m in METRICS},
-            "kinds": {m: {kind: shown(getattr(p.by_kind[kind], m), m) for kind in KINDS} for m in METRICS},
+            "total": {m: error_text(p.error(m), m) for m in METRICS},
+            "kinds": {m: {kind: error_text(getattr(p.by_kind[kind], m), m) for kind in KINDS} for m in METRICS},
             "bars": {m: {kind: bar(getattr(p.by_kind[kind], m)) for kind in KINDS} for m in METRICS},
             "by": {m: front[i] for m, front in fronts.items()},
             "why": {m: reason(p, study.points[by], m) if (by := front[i]) is not None else None for m, front in fronts.items()},
@@ -170,30 +192,30 @@ def html(study: Study, scene: Scene, metric: str, pictures: dict[int, dict[str, 
         for i, p in enumerate(study.points)
     ]
     exact = study.points[0]
-    return room.get_template("page.html.j2").render(
+    return environment.get_template("page.html.j2").render(
         study=study,
         description=scene.description,
         version=__version__,
         metric=metric,
-        metrics=SAID,
-        kinds=KINDS_SAID,
+        metrics=METRIC_MEANINGS,
+        kinds=KIND_MEANINGS,
         charts={name: Chart(study, name) for name in METRICS},
         ranks={name: ranks(study, name) for name in METRICS},
         exact=exact,
         data=data,
-        shown=shown,
+        shown=error_text,
         milliseconds=milliseconds,
         bar=bar,
-        floor_text={m: shown(getattr(study.floor, m), m) for m in METRICS},
+        floor_text={m: error_text(getattr(study.floor, m), m) for m in METRICS},
         floor_bar={m: bar(getattr(study.floor, m)) for m in METRICS},
         ramp=", ".join(f"rgb({int(r)} {int(g)} {int(b)})" for r, g, b in RAMP),
-        least=shown(LEAST),
-        greatest=shown(_greatest(study)),
+        least=error_text(LEAST),
+        greatest=error_text(_greatest(study)),
     )
 
 
 def bar(value: float) -> float:
-    """How long its bar is [percent]: nothing up to FAINTEST, all of it from 1 on, by the logarithm."""
+    """Returns the length of an error's bar [percent], on a logarithmic scale: 0 up to FAINTEST, and 100 from 1 on."""
     if not value > FAINTEST:
         return 0.0
     return round(min(1.0, 1 - math.log(min(value, 1.0)) / math.log(FAINTEST)) * 100, 1)
@@ -201,7 +223,15 @@ def bar(value: float) -> float:
 
 @dataclass(frozen=True)
 class Mark:
-    """A point of a chart [SVG units]. low, high: the ends of its range of time. number, tie: its place on the front."""
+    """A point in a chart.
+
+    index: the index of the point in the study.
+    x, y: its position [SVG units].
+    low, high: the ends of the bar that shows the range of its time [SVG units].
+    rate: the rate of its setting: phong, gouraud or flat.
+    number: its place on the front; None if it is dominated.
+    tie: True if time and error equal those of the place before.
+    """
 
     index: int
     x: float
@@ -215,25 +245,29 @@ class Mark:
 
 @dataclass(frozen=True)
 class Chart:
-    """Time against the error by one metric, as an SVG has it: what is faster to the left, what is more exact below."""
+    """The chart of time against error, for an SVG picture: faster points are further left, more exact ones further down.
+
+    study: the study whose points the chart shows.
+    metric: the metric by which errors are shown.
+    """
 
     study: Study
     metric: str
 
     @property
     def size(self) -> tuple[float, float]:
-        """Width, height."""
+        """Width and height of the chart [SVG units]."""
         return CHART
 
     @property
     def plot(self) -> tuple[float, float, float, float]:
-        """Left, top, right, bottom."""
-        left, right, top, bottom = AROUND
+        """The left, top, right and bottom edge of the plot [SVG units]."""
+        left, right, top, bottom = MARGINS
         return left, top, CHART[0] - right, CHART[1] - bottom
 
     @cached_property
     def marks(self) -> list[Mark]:
-        """All points: the dominated ones first, which the front then lies over."""
+        """The marks of all points, in drawing order. The front is drawn last, so that it covers the dominated points."""
         places = {rank.index: rank for rank in ranks(self.study, self.metric)}
         marks = []
         for i, p in enumerate(self.study.points):
@@ -245,7 +279,7 @@ class Chart:
 
     @property
     def line(self) -> str:
-        """The front as a path: the error that is to be had within a time falls in steps."""
+        """The front as an SVG path in steps. At each time it shows the least error of the settings that take no longer."""
         places = sorted((m.x, -m.y) for m in self.marks if m.number is not None)
         steps = [f"M{places[0][0]:.1f} {-places[0][1]:.1f}"]
         steps += [f"H{x:.1f}V{-y:.1f}" for x, y in places[1:]]
@@ -253,7 +287,7 @@ class Chart:
 
     @cached_property
     def _times(self) -> tuple[float, float, bool]:
-        """Least, greatest [s], and whether by the logarithm."""
+        """(least, greatest, logarithmic) of the axis of times: its range [s], and True for a logarithmic axis."""
         timings = [p.timing for p in self.study.points]
         low, high = min(t.low for t in timings), max(t.high for t in timings)
         if high > WIDE * low:
@@ -263,29 +297,29 @@ class Chart:
 
     @cached_property
     def _decades(self) -> tuple[int, int]:
-        """Powers of ten below and above all errors but zero."""
-        some = [e for e in (p.error(self.metric) for p in self.study.points) if e > 0 and math.isfinite(e)] or [1.0]
-        low, high = math.floor(math.log10(min(some)) - 0.02), math.ceil(math.log10(max(some)) + 0.02)
+        """(low, high), exponents of ten: all errors that are finite and not zero lie between 10^low and 10^high."""
+        positive = [e for e in (p.error(self.metric) for p in self.study.points) if e > 0 and math.isfinite(e)] or [1.0]
+        low, high = math.floor(math.log10(min(positive)) - 0.02), math.ceil(math.log10(max(positive)) + 0.02)
         return low, max(high, low + 1)
 
     @cached_property
     def _lanes(self) -> tuple[bool, bool]:
-        """Whether errors of zero, and pictures with values that are not finite, need a place of their own."""
-        found = [p.error(self.metric) for p in self.study.points]
-        return 0.0 in found, math.inf in found
+        """(zero, infinite): whether the chart needs a strip for errors of zero, and one for pictures with infinities or NaN."""
+        values = [p.error(self.metric) for p in self.study.points]
+        return 0.0 in values, math.inf in values
 
     def x(self, seconds: float) -> float:
-        """Where a time lies."""
+        """Returns the position of a time [SVG units]."""
         left, _, right, _ = self.plot
         low, high, logarithmic = self._times
         share = math.log(seconds / low) / math.log(high / low) if logarithmic else (seconds - low) / (high - low)
         return round(left + share * (right - left), 1)
 
     def y(self, error: float) -> float:
-        """Where an error lies: zero at the very bottom, what is not finite at the very top."""
+        """Returns the position of an error [SVG units]. Zero has a strip at the bottom, infinity one at the top."""
         _, top, _, bottom = self.plot
-        zero, broken = self._lanes
-        highest, lowest = top + 26 * broken, bottom - 26 * zero
+        zero, infinite = self._lanes
+        highest, lowest = top + LANE if infinite else top, bottom - LANE if zero else bottom
         if error == 0 or not math.isfinite(error):
             return bottom - 10 if error == 0 else top + 10
         low, high = self._decades
@@ -293,35 +327,36 @@ class Chart:
 
     @property
     def columns(self) -> Iterator[tuple[float, str]]:
-        """(x, time [ms]) of the lines that times are read from."""
+        """(x [SVG units], text in milliseconds) of each tick of the axis of times."""
         low, high, logarithmic = (self._times[0] * 1e3, self._times[1] * 1e3, self._times[2])
         for value in _round_numbers(low, high, logarithmic):
             yield self.x(value / 1e3), f"{value:g}"
 
     @property
     def rows(self) -> Iterator[tuple[float, str]]:
-        """(y, error) of the lines that errors are read from."""
+        """(y [SVG units], text) of each horizontal line of the chart's grid, from which errors are read."""
         low, high = self._decades
-        every = -(-(high - low) // 8)
-        for power in range(low, high + 1, every):
+        # There are about eight lines at most.
+        step = -(-(high - low) // 8)
+        for power in range(low, high + 1, step):
             text = f"{10.0**power:.{max(-power - 2, 0)}%}" if self.metric == "codes" else _power(power)
             yield self.y(10.0**power), text
-        zero, broken = self._lanes
+        zero, infinite = self._lanes
         if zero:
             yield self.y(0.0), "0"
-        if broken:
+        if infinite:
             yield self.y(math.inf), "not finite"
 
 
 def _power(power: int) -> str:
-    """10⁻³; what is from 0.01 to 100 plain."""
+    """Returns a power of ten as text, such as 10⁻³; numbers from 0.01 to 100 are written out."""
     if -2 <= power <= 2:
         return f"{10.0**power:g}"
     return "10" + str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
 
 
 def _round_numbers(low: float, high: float, logarithmic: bool) -> list[float]:
-    """Between them, some eight, that are easily read."""
+    """Returns about eight round numbers from low to high."""
     if logarithmic:
         powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
         digits = (1, 2, 5) if high > 30 * low else (1, 1.5, 2, 3, 4, 5, 7)
@@ -333,49 +368,53 @@ def _round_numbers(low: float, high: float, logarithmic: bool) -> list[float]:
 
 
 def _greatest(study: Study) -> float:
-    """What the error maps go up to, all of them: colours are compared from one to the other."""
+    """Returns the greatest error on the scale of the error maps. All maps have the same scale, so that they can be compared."""
     return max([10 * LEAST, *(p.total.max_abs for p in study.points)])
 
 
 def _pictures(folder: Path, study: Study, scene: Scene, renderer: Renderer) -> dict[int, dict[str, str]]:
-    """For each point what the page has of it; those on a front are written into the folder as well."""
+    """Draws the pictures of the page and returns them as `html` takes them. Also writes those of the front to a folder."""
     drawn = Pictures(scene, renderer)
     greatest = _greatest(study)
     front = {i for metric in METRICS for i, by in enumerate(study.front(metric)) if by is None}
-    found: dict[int, dict[str, str]] = {}
-    # Base64 makes four bytes of three.
+    embedded: dict[int, dict[str, str]] = {}
+    # The number of bytes that are left for pictures. Base64 needs four characters for three bytes.
     room = (PAGE - POINT * len(study.points)) * 3 // 4
-    # What is on a front comes first, if there is not room for all.
+    # Points on a front come first, because there may not be room for all points.
     for i in sorted(range(len(study.points)), key=lambda i: i not in front):
         setting = study.points[i].setting
         if room <= 0 and i not in front:
             break
         picture = drawn.drawn(setting)
         error = np.abs(picture.astype(np.float64) - drawn.truth).max(axis=2)
-        # Outlines are left out of the errors, and so of their map.
+        # Pixels at outlines do not count in the errors, so the map does not show them either.
         error = np.where(drawn.certain, error, 0.0)
-        found[i] = {}
+        embedded[i] = {}
         if i in front:
             name = re.sub(r"[^a-z0-9.]+", "-", str(setting))
             Image(np.ascontiguousarray(picture, dtype=np.float32)).save(folder / f"{name}.png")
             Image(_heat(error, greatest), "srgb").save(folder / f"{name}-error.png")
-            found[i]["file"] = name
+            embedded[i]["file"] = name
         if room > 0:
             small = Image(_smaller(picture, np.add)).encoded()
             heated = Image(_heat(_smaller(error, np.maximum), greatest), "srgb")
-            found[i] |= {"picture": _jpeg(small), "error": _jpeg(heated)}
-            room -= (len(found[i]["picture"]) + len(found[i]["error"])) * 3 // 4
-    return found
+            embedded[i] |= {"picture": _jpeg(small), "error": _jpeg(heated)}
+            room -= (len(embedded[i]["picture"]) + len(embedded[i]["error"])) * 3 // 4
+    return embedded
 
 
 def _heat(error: Array, greatest: float) -> Array:
-    """(H, W, 3) uint8, on the scale of all the maps."""
-    # heat() takes the largest error for its scale: a row is put under the map that has it.
+    """Returns the map (H, W, 3) uint8 of errors (H, W), on a scale up to `greatest`."""
+    # heat() takes the scale from the largest error. So a row with the greatest error is added, and removed from the result.
     return heat(np.vstack([error, np.full_like(error[:1], greatest)]))[0][:-1]
 
 
 def _smaller(picture: Array, gather: np.ufunc) -> Array:
-    """The picture (H, W, ...) at most WIDTH wide: averages where sums are gathered, else the largest."""
+    """Returns a picture reduced by a whole factor, so that it is at most WIDTH pixels wide.
+
+    picture: (H, W, ...), with any number of further axes.
+    gather: np.add to average the pixels that become one, np.maximum to take the largest of them.
+    """
     step = -(-picture.shape[1] // WIDTH)
     if step == 1:
         return picture
@@ -388,7 +427,7 @@ def _smaller(picture: Array, gather: np.ufunc) -> Array:
 
 
 def _jpeg(image: Image) -> str:
-    """Base64 of a JPEG."""
+    """Returns an image as a JPEG file in base64."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "picture.jpg"
         image.save(path)
@@ -396,8 +435,9 @@ def _jpeg(image: Image) -> str:
 
 
 def _write(path: Path, text: str) -> None:
+    """Writes a text file, whole or not at all. Errors: GlshadeError."""
     try:
-        with replacing(path) as beside:
-            beside.write_text(text, encoding="utf-8")
+        with replacing(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
     except OSError as error:
         raise GlshadeError(f"{path}: cannot be written: {error.strerror}") from None

@@ -1,4 +1,4 @@
-"""Setting: one choice for every knob, and the space of all of them that make a difference to a scene."""
+"""Setting: a value for each knob of quality, and the space of all settings that draw a scene in different ways."""
 
 from __future__ import annotations
 
@@ -9,19 +9,31 @@ from typing import Any
 
 from glshade.assembly.assembly import assemble
 from glshade.glsl.generator import generate
-from glshade.glsl.plan import plan_instance
+from glshade.glsl.planner import plan_instance
 from glshade.radiance.readying import ready
 from glshade.scene.quality import Quality
 from glshade.scene.scene import Scene
 
-# Triangles are cut in four this often at most, and refined to these errors of linear light.
+# The values that are tried for the knobs `subdivide` (the number of times that every triangle is cut in four) and `refine` (the
+# largest error of light per vertex) [linear].
 LEVELS = (1, 2)
 REFINEMENTS = (3e-2, 3e-3)
 
 
 @dataclass(frozen=True)
 class Setting:
-    """What is chosen of each knob; None is the scene's own word, which counts as exact. samples: of the film."""
+    """A value for each knob. None leaves a knob at the scene's own value, which counts as exact.
+
+    fresnel: "schlick" for Schlick's approximation of the reflection at an interface.
+    specular: "half_angle" for highlights by the half vector.
+    shading: the rate, "phong", "gouraud" or "flat".
+    subdivide: how often every triangle is cut in four.
+    refine: the largest error of light per vertex to which meshes are refined [linear].
+    normalise: False to use interpolated normals without normalising them.
+    arithmetic: "fast" for forms of powers and distributions that lose more digits.
+    storage: the format of the picture on the GPU.
+    samples: the film's samples in a pixel.
+    """
 
     fresnel: str | None = None
     specular: str | None = None
@@ -35,36 +47,41 @@ class Setting:
 
     def __str__(self) -> str:
         words = [self.shading]
-        words += [f"subdivide {self.subdivide}"] * bool(self.subdivide)
-        words += [f"refine {self.refine:g}" if self.refine else ""] * bool(self.refine)
-        words += ["not normalised"] * (self.normalise is False)
+        if self.subdivide:
+            words.append(f"subdivide {self.subdivide}")
+        if self.refine:
+            words.append(f"refine {self.refine:g}")
+        if self.normalise is False:
+            words.append("not normalised")
         words += [value for value in (self.fresnel, self.specular, self.arithmetic) if value]
-        words += [f"{self.samples} samples"] * bool(self.samples)
+        if self.samples:
+            words.append(f"{self.samples} samples")
         return ", ".join([*words, self.storage])
 
     @property
     def quality(self) -> Quality:
-        """The same, as the scene file has it."""
-        said = {name: getattr(self, name) for name in Quality.model_fields}
-        return Quality.model_validate({name: value for name, value in said.items() if value is not None})
+        """The setting in the form of a scene file's table `quality`."""
+        values = {name: getattr(self, name) for name in Quality.model_fields}
+        return Quality.model_validate({name: value for name, value in values.items() if value is not None})
 
     def applied(self, scene: Scene) -> Scene:
-        """The scene at this setting, whatever its own quality says."""
+        """Returns the scene with this setting, which replaces the quality of the scene and of its objects."""
         film = scene.film if self.samples is None else scene.film.model_copy(update={"samples": self.samples})
         objects = tuple(item.model_copy(update={"quality": None}) for item in scene.objects)
         return scene.model_copy(update={"film": film, "quality": self.quality, "objects": objects})
 
     def only(self, *kinds: str) -> Setting:
-        """The choices of these kinds; the others as the exact setting has them."""
+        """Returns the setting with the knobs of these kinds; all other knobs are exact."""
         kept = {name: getattr(self, name) for kind in kinds for name in KINDS[kind]}
         return replace(EXACT, **kept)
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: what is not left out."""
+        """Returns name of a knob -> value, for the values that are not None, in a form that JSON can hold."""
         return {f.name: getattr(self, f.name) for f in fields(self) if getattr(self, f.name) is not None}
 
 
-# Errors are told apart by these, and each is measured against the picture in which those before it are made as well.
+# kind of error -> its knobs. The kinds are applied one after another. The error of a kind is the difference that its knobs make
+# to the picture to which all kinds before it are already applied.
 KINDS: dict[str, tuple[str, ...]] = {
     "model": ("fresnel", "specular"),
     "sampling": ("shading", "subdivide", "refine", "normalise", "samples"),
@@ -75,10 +92,12 @@ EXACT = Setting()
 
 
 def space(scene: Scene, only: tuple[str, ...] = ()) -> tuple[list[Setting], dict[str, str]]:
-    """(settings, inert): every combination that draws another picture, or draws it by other means; the exact one first.
+    """Returns (settings, inert): the settings that draw a scene in different ways, and the values that change nothing.
 
-    only: the knobs to turn, all where it is empty. inert: "knob=value" -> why it was dropped. A choice is dropped where, for
-    each of the others' combinations, programs, materials and vertices are what they are without it.
+    settings: the exact setting comes first.
+    inert: "knob=value" -> the reason why the value is not tried. A value is dropped if it changes no program, no material and
+        no vertex, whatever the values of the other knobs are.
+    only: the knobs to vary; empty for all.
     """
     wanted = only or tuple(f.name for f in fields(Setting))
     seen: dict[Any, Setting] = {}
@@ -86,15 +105,16 @@ def space(scene: Scene, only: tuple[str, ...] = ()) -> tuple[list[Setting], dict
     tried: set[tuple[str, Any]] = set()
     parts: dict[Setting, Any] = {}
     for setting in _combinations(scene, wanted):
-        # What a picture is kept in has no say in what it is made of, and refining a mesh takes its time.
+        # Storage and samples change no program, material or vertex. Without them fewer settings differ, and meshes are refined
+        # less often.
         bare = replace(setting, storage=EXACT.storage, samples=None)
         if bare not in parts:
-            parts[bare] = _made(scene, bare)
-        made = parts[bare], setting.storage, setting.samples
+            parts[bare] = _sources(scene, bare)
+        sources = parts[bare], setting.storage, setting.samples
         choices = {(f.name, getattr(setting, f.name)) for f in fields(Setting)}
         tried |= choices
-        if made not in seen:
-            seen[made] = setting
+        if sources not in seen:
+            seen[sources] = setting
             kept |= choices
     inert = {
         f"{name}={value}": "every program, material and vertex is the same without it"
@@ -105,6 +125,8 @@ def space(scene: Scene, only: tuple[str, ...] = ()) -> tuple[list[Setting], dict
 
 
 def _combinations(scene: Scene, wanted: tuple[str, ...]) -> Iterator[Setting]:
+    """Yields all combinations of the wanted knobs' values that make sense together, the exact setting first."""
+
     def options(name: str, *values: Any) -> tuple[Any, ...]:
         return (getattr(EXACT, name), *values) if name in wanted else (getattr(EXACT, name),)
 
@@ -120,7 +142,7 @@ def _combinations(scene: Scene, wanted: tuple[str, ...]) -> Iterator[Setting]:
     stores: tuple[str, ...] = ("rgba16f", "rgb10_a2", "r11f_g11f_b10f", "rgba8")
     blends = any(instance.material.alpha_mode == "blend" for instance in assemble(scene).instances)
     if blends or len(scene.film.background) == 4 or any(light.is_negative for light in scene.lights or ()):
-        # It has no alpha, and nothing below zero.
+        # This format has no alpha and no negative numbers.
         stores = tuple(name for name in stores if name != "r11f_g11f_b10f")
     fewer = [count for count in (4, 2, 1) if count < scene.film.samples]
     for fresnel, specular, way, arithmetic, samples, storage in product(
@@ -134,8 +156,11 @@ def _combinations(scene: Scene, wanted: tuple[str, ...]) -> Iterator[Setting]:
         yield Setting(fresnel=fresnel, specular=specular, arithmetic=arithmetic, samples=samples, storage=storage, **way)
 
 
-def _made(scene: Scene, setting: Setting) -> Any:
-    """All that a picture is drawn from, but for what it is kept in: equal for settings that cannot differ."""
+def _sources(scene: Scene, setting: Setting) -> Any:
+    """Returns everything that a picture is drawn from, except its storage.
+
+    The results for two settings are equal if both draw the same picture.
+    """
     assembly = ready(setting.applied(scene))
     return tuple(
         (generate(plan_instance(i, assembly, "linear")), i.material, i.mesh.digest, i.back_faces) for i in assembly.instances

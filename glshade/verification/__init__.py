@@ -1,1 +1,1 @@
-"""Verification: whether a picture of the GPU is what the float64 reference says that it may be."""
+"""Verification: checks that a picture drawn by the GPU lies within the bounds that the float64 reference allows."""

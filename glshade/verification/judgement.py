@@ -1,11 +1,11 @@
-"""Comparison: a picture judged against what it may show. Who made the one or the other is not known here.
+"""Judgement: compares a picture with the values that its pixels may have. This module does not depend on how either was made.
 
-finite gate, classes of pixels, intervals, metrics -> Comparison; report.py writes it down.
+`classify` says how certain each pixel is, and `judge` compares a picture with the candidates of its pixels.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
@@ -20,7 +20,15 @@ Indices = NDArray[np.intp]
 
 
 class PixelClass(IntEnum):
-    """What can be said of a pixel beforehand."""
+    """A class says how certain the value of a pixel is, before any picture is drawn.
+
+    BACKGROUND: no surface can cover the pixel. It has exactly the background's value.
+    INTERIOR: one surface certainly covers the pixel and is certainly the nearest one.
+    SEAM: triangles that share an edge certainly cover the pixel together. A driver may show either of them.
+    SILHOUETTE: the pixel is at an outline. A driver may show one of several candidates or the background.
+    TIE: several surfaces are at depths that a driver may be unable to tell apart.
+    MASKED: the caller excluded the pixel by a mask.
+    """
 
     BACKGROUND = 0
     INTERIOR = 1
@@ -31,16 +39,21 @@ class PixelClass(IntEnum):
 
     @property
     def ambiguous(self) -> bool:
-        """Whether such pixels count against the budget."""
+        """Whether pixels of this class are ambiguous. A picture with too many ambiguous pixels cannot be verified."""
         return self >= PixelClass.SILHOUETTE
 
 
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """What a picture may show.
+    """The values that the pixels of a picture may have, as N candidates; a pixel may have several.
 
-    size: width, height. background (4,). classes (H*W,): a PixelClass each. open (H*W,): where the background is accepted.
-    pixel (N,), ascending: of each candidate; low, high, centre (N, 4): its interval, and the value in its middle.
+    size: width, height of the picture [pixels].
+    background: (4,), the clear colour [linear, premultiplied].
+    classes: (H * W,), the PixelClass of each pixel.
+    open: (H * W,), True where the background is accepted as well.
+    pixel: (N,), ascending, the pixel of each candidate.
+    low, high: (N, 4), the interval of each candidate.
+    centre: (N, 4), the reference's own value of each candidate, inside the interval.
     """
 
     size: tuple[int, int]
@@ -55,13 +68,25 @@ class Expected:
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What came of it.
+    """The result of comparing a picture with its candidates.
 
-    counts: pixels of each class. non_finite: values. error (H, W): distance from the nearest accepted candidate's middle,
-    the largest channel's. excess (H, W): how far outside every interval; 0 where a pixel is explained. used (H, W): the
-    error's share of what is allowed. candidate (H*W,): the nearest one, -1: the background. worst, rmse, p999: of the errors
-    of interior pixels and seams. tolerance: the largest allowed at any of them. empty: whether the picture is the background
-    alone; may_be_empty: whether it may be.
+    A candidate explains a pixel if the pixel's value lies within the candidate's interval. The pixel's tolerance is the
+    distance from the centre of the nearest candidate to the end of its interval. Only interior pixels and seams count in worst,
+    rmse, p999 and tolerance.
+
+    counts: the number of pixels of each class.
+    non_finite: the number of channel values that are infinite or NaN.
+    unexplained: the number of pixels that no candidate explains.
+    error: (H, W), the distance from the centre of the nearest candidate, in the channel where it is largest [linear].
+    excess: (H, W), the distance from the nearest interval, in the channel where it is largest; 0 for explained pixels [linear].
+    used: (H, W), the ratio of the error to the pixel's tolerance.
+    candidate: (H * W,), the index of the nearest candidate; -1 is the background.
+    worst: the largest error [linear].
+    rmse: the root of the mean squared error [linear].
+    p999: the error that 99.9 % of the pixels do not exceed [linear].
+    tolerance: the largest tolerance of any pixel [linear].
+    empty: True if every pixel of the picture shows the background.
+    may_be_empty: True if the reference accepts a picture that shows only the background.
     """
 
     counts: dict[PixelClass, int]
@@ -80,12 +105,12 @@ class Comparison:
 
     @property
     def ambiguous(self) -> float:
-        """The picture's share of silhouettes, ties and masked pixels."""
+        """The share of silhouettes, ties and masked pixels among all pixels."""
         return self._ambiguous / max(sum(self.counts.values()), 1)
 
     @property
     def doubtful(self) -> float:
-        """The share of the same among all pixels that are not background."""
+        """The share of silhouettes, ties and masked pixels among the pixels that are not background."""
         return self._ambiguous / max(sum(self.counts.values()) - self.counts[PixelClass.BACKGROUND], 1)
 
     @property
@@ -96,10 +121,19 @@ class Comparison:
 def classify(
     size: int, pixel: Indices, depth: Array, slack: Array, partial: Flags, sealed: Flags
 ) -> tuple[Flags, NDArray[np.uint8], Flags, Array]:
-    """(kept (N,), classes (size,), open (size,), hidden (size,)) of opaque candidates (N,) for the pixels of a picture.
+    """Returns (kept (N,), classes (size,), open (size,), hidden (size,)) for N opaque candidates.
 
-    depth: 1 near, 0 far, known to `slack`. partial: may be covered or not. sealed: partial, but together with others certain
-    to be covered. kept: what may be seen. hidden: a candidate farther than this cannot be seen.
+    kept: True for a candidate that may be visible.
+    classes: the PixelClass of each pixel.
+    open: True for a pixel in which the background may be visible.
+    hidden: the depth in each pixel behind which no candidate is visible.
+
+    size: the number of pixels in the picture.
+    pixel: (N,), the pixel of each candidate.
+    depth: (N,), from 1 at the near plane to 0 at the far plane.
+    slack: (N,), the largest difference between the driver's depth and `depth`.
+    partial: (N,), True for a candidate that a driver may leave out.
+    sealed: (N,), True for a partial candidate if it and others together certainly cover the pixel.
     """
     nearest = np.full(size, -np.inf)
     certain = ~partial
@@ -124,15 +158,17 @@ def classify(
 
 
 def judge(picture: Array, expected: Expected, mask: Flags | None = None) -> Comparison:
-    """Judges a linear picture (H, W, 3 or 4). mask (H, W): pixels to leave out.
+    """Compares a picture with the values that it may have.
 
-    Errors: GlshadeError where the shapes differ.
+    picture: (H, W, 3 or 4) [linear, premultiplied].
+    mask: optional (H, W); True for pixels that are left out.
+    Errors: GlshadeError if the shapes differ.
     """
     width, height = expected.size
     if picture.ndim != 3 or picture.shape[:2] != (height, width) or picture.shape[2] not in (3, 4):
         raise GlshadeError(f"the picture has shape {picture.shape}, not ({height}, {width}, 3 or 4)")
     channels = picture.shape[2]
-    # Before anything else: a clamp or a comparison would make something harmless of them.
+    # Infinities and NaN are counted first, because later clamps and comparisons could hide them.
     finite = np.isfinite(picture)
     non_finite = int((~finite).sum())
     value = np.where(finite, picture, 0.0).astype(np.float64).reshape(-1, channels)
@@ -143,15 +179,16 @@ def judge(picture: Array, expected: Expected, mask: Flags | None = None) -> Comp
     background = np.asarray(expected.background, dtype=np.float32).astype(np.float64)[:channels]
     from_background = np.abs(value - background).max(axis=1)
 
-    of = value[expected.pixel]
+    actual = value[expected.pixel]
     low, high, centre = (part[:, :channels] for part in (expected.low, expected.high, expected.centre))
-    outside = np.maximum(np.maximum(low - of, of - high), 0).max(axis=1)
-    error = np.abs(of - centre)
-    unseen = expected.open.copy()
-    unseen[expected.pixel[((low <= background) & (background <= high)).all(axis=1)]] = True
-    # Of what is allowed on the side where the value lies.
-    room = np.where(of >= centre, high - centre, centre - low)
+    outside = np.maximum(np.maximum(low - actual, actual - high), 0).max(axis=1)
+    error = np.abs(actual - centre)
+    background_allowed = expected.open.copy()
+    background_allowed[expected.pixel[((low <= background) & (background <= high)).all(axis=1)]] = True
+    # Intervals need not be symmetric. The tolerance is the distance from the centre to the end on the side of the actual value.
+    room = np.where(actual >= centre, high - centre, centre - low)
     share = (error / np.maximum(room, 1e-300)).max(axis=1)
+    # The nearest candidate of a pixel is the first in this order.
     order = np.lexsort((share, outside, expected.pixel))
     first = np.ones(len(order), dtype=np.bool_)
     first[1:] = expected.pixel[order[1:]] != expected.pixel[order[:-1]]
@@ -165,11 +202,11 @@ def judge(picture: Array, expected: Expected, mask: Flags | None = None) -> Comp
     excess[place] = np.where(bare[place], np.minimum(outside[best], from_background[place]), outside[best])
     by_surface = ~(bare[place] & (from_background[place] == 0))
     chosen = best[by_surface]
-    there = place[by_surface]
-    candidate[there] = chosen
-    errors[there] = error[chosen].max(axis=1)
-    used[there] = share[chosen]
-    allowed[there] = room[chosen].max(axis=1)
+    place = place[by_surface]
+    candidate[place] = chosen
+    errors[place] = error[chosen].max(axis=1)
+    used[place] = share[chosen]
+    allowed[place] = room[chosen].max(axis=1)
     excess[broken] = errors[broken] = np.inf
     excess[classes == PixelClass.MASKED] = 0.0
     counted = ((classes == PixelClass.INTERIOR) | (classes == PixelClass.SEAM)) & ~broken
@@ -188,44 +225,5 @@ def judge(picture: Array, expected: Expected, mask: Flags | None = None) -> Comp
         p999=float(np.quantile(interior, 0.999)) if len(interior) else 0.0,
         tolerance=float(allowed[counted].max(initial=0.0)),
         empty=bool((from_background == 0).all()) and not broken.any(),
-        may_be_empty=bool(unseen[expected.pixel].all()),
-    )
-
-
-@dataclass(frozen=True)
-class Difference:
-    """How two pictures differ. non_finite: values of either. worst, rmse, p999: of the pixels' largest channels."""
-
-    non_finite: int
-    worst: float
-    rmse: float
-    p999: float
-    differing: int
-    map: Array = field(repr=False, compare=False)
-
-    @property
-    def same(self) -> bool:
-        """Whether nothing differs by more than was allowed, and everything is finite."""
-        return self.non_finite == 0 and self.differing == 0
-
-
-def compare(a: Any, b: Any, *, tolerance: float = 0.0, mask: Flags | None = None) -> Difference:
-    """Two pictures of one size, (H, W, C) or Image, linear. tolerance: what a channel may differ by.
-
-    mask (H, W): pixels to leave out. Errors: GlshadeError where the shapes differ.
-    """
-    one, other = (np.asarray(getattr(x, "pixels", x)) for x in (a, b))
-    if one.shape != other.shape or one.ndim != 3:
-        raise GlshadeError(f"pictures of shapes {one.shape} and {other.shape} cannot be compared")
-    finite = np.isfinite(one) & np.isfinite(other)
-    error = np.abs(np.where(finite, one, 0).astype(np.float64) - np.where(finite, other, 0)).max(axis=2)
-    if mask is not None:
-        error = np.where(mask, 0.0, error)
-    return Difference(
-        non_finite=int((~finite).sum()),
-        worst=float(error.max(initial=0.0)),
-        rmse=float(np.sqrt(np.mean(error**2))) if error.size else 0.0,
-        p999=float(np.quantile(error, 0.999)) if error.size else 0.0,
-        differing=int((error > tolerance).sum()),
-        map=error,
+        may_be_empty=bool(background_allowed[expected.pixel].all()),
     )

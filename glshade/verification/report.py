@@ -1,4 +1,4 @@
-"""Report: a comparison written down, for a person to look at: one page that holds everything, and its pictures beside it."""
+"""Report: writes the result of a comparison as one self-contained HTML page, with the pictures as files beside it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,8 @@ from glshade.verification.judgement import Comparison, PixelClass
 
 Array = NDArray[Any]
 
-# Colours that people with any colour vision tell apart, after Okabe and Ito 2008.
+# The colours of the pixel classes, from the palette of Okabe and Ito 2008. People with any kind of colour vision can tell them
+# apart.
 CLASS_COLOURS: dict[PixelClass, tuple[int, int, int]] = {
     PixelClass.BACKGROUND: (38, 42, 50),
     PixelClass.INTERIOR: (150, 158, 170),
@@ -29,24 +30,35 @@ CLASS_COLOURS: dict[PixelClass, tuple[int, int, int]] = {
 }
 UNEXPLAINED = (255, 0, 60)
 CLASS_MEANING: dict[PixelClass, str] = {
-    PixelClass.BACKGROUND: "nothing can cover it: exactly the clear value",
-    PixelClass.INTERIOR: "one surface covers it fully and is nearest",
-    PixelClass.SEAM: "an edge between triangles: one of the two",
-    PixelClass.SILHOUETTE: "an outline: one of the candidates, or the background",
-    PixelClass.TIE: "two surfaces at one depth: either",
-    PixelClass.MASKED: "left out",
+    PixelClass.BACKGROUND: "no surface can cover the pixel: exactly the background",
+    PixelClass.INTERIOR: "one surface certainly covers the pixel and is the nearest",
+    PixelClass.SEAM: "an edge between triangles: either of the two",
+    PixelClass.SILHOUETTE: "an outline: any of the candidates, or the background",
+    PixelClass.TIE: "surfaces at the same depth: any of them",
+    PixelClass.MASKED: "left out by the caller",
 }
-# From the least error to the greatest: dark, blue, violet, orange, yellow, white.
+# The colours of the error map, from the least error to the greatest, sRGB-encoded from 0 to 255.
 RAMP = np.array([(8, 10, 18), (32, 42, 110), (122, 40, 130), (214, 72, 72), (250, 160, 50), (252, 240, 160)], dtype=np.float64)
-# Errors below a float32 step of 1 are all the same to the eye.
+# Errors up to this one all have the first colour [linear]. It is smaller than the rounding error of a float32 value near 1.
 LEAST = 1e-8
-# Narrower pictures are drawn larger, pixel by pixel.
+# Pictures narrower than this are enlarged by a whole factor [pixels of the page].
 COMFORTABLE = 560
 
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What is written. verdict: one word; facts: name -> text; rows: the worst pixels, a table under `heads`."""
+    """The contents of a report on a picture of W x H pixels.
+
+    title: the heading.
+    verdict: one word, such as "verified".
+    reasons: the reasons why the picture is not verified, one sentence for each.
+    picture, reference: (H, W, 3 or 4) float32 [linear, premultiplied].
+    comparison: the comparison of the picture with the reference.
+    classes: (H, W), the PixelClass of each pixel.
+    facts: name of a figure -> its value as text.
+    heads: the column headings of the table of the worst pixels.
+    rows: the cells of the table of the worst pixels, a row for each pixel.
+    """
 
     title: str
     verdict: str
@@ -61,7 +73,10 @@ class Report:
 
 
 def heat(error: Array) -> tuple[Array, float, float]:
-    """((H, W, 3) uint8, least, greatest): a logarithmic map of errors (H, W)."""
+    """Returns (map (H, W, 3) uint8, least, greatest) of errors (H, W).
+
+    The map shows the errors as colours, on a logarithmic scale from `least` to `greatest`.
+    """
     finite = np.where(np.isfinite(error), error, 0.0)
     greatest = max(float(finite.max(initial=0.0)), 10 * LEAST)
     place = np.log(np.maximum(finite, LEAST) / LEAST) / np.log(greatest / LEAST) * (len(RAMP) - 1)
@@ -73,7 +88,11 @@ def heat(error: Array) -> tuple[Array, float, float]:
 
 
 def class_map(classes: Array, excess: Array) -> Array:
-    """(H, W, 3) uint8: each pixel in its class's colour, unexplained ones in red."""
+    """Returns a map (H, W, 3) uint8 of each pixel in the colour of its class, and of unexplained pixels in red.
+
+    classes: (H, W), the PixelClass of each pixel.
+    excess: (H, W), as in Comparison.
+    """
     palette = np.array([CLASS_COLOURS[kind] for kind in PixelClass], dtype=np.uint8)
     result: Array = palette[classes]
     result[excess > 0] = UNEXPLAINED
@@ -81,9 +100,11 @@ def class_map(classes: Array, excess: Array) -> Array:
 
 
 def write(folder: Path, report: Report) -> Path:
-    """Writes index.html, and result, reference, error and classes as PNG (the first three as EXR too). Returns the page.
+    """Writes index.html and the pictures result, reference, error and classes; returns the path of index.html.
 
-    Errors: GlshadeError.
+    All four pictures are written as PNG, and the first three as EXR too. The page embeds the PNG pictures, so it can be read
+    without the files.
+    Errors: GlshadeError where the folder or a file cannot be written.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -111,7 +132,7 @@ def write(folder: Path, report: Report) -> Path:
 
 
 def _shown(pixels: Array) -> Image:
-    """As a screen shows it; what is not a number in magenta."""
+    """Returns linear pixels (H, W, 3 or 4) as an encoded Image for a PNG file. Pixels with infinities or NaN are magenta."""
     broken: NDArray[np.bool_] = np.logical_not(np.isfinite(pixels).all(axis=2))
     image = Image(np.where(broken[..., None], 0, pixels).astype(np.float32)).encoded()
     image.pixels[broken, :3] = (255, 0, 255)
@@ -141,7 +162,7 @@ def _page(report: Report, images: Mapping[str, str], least: float, greatest: flo
     )
     legend += (
         f"<tr><td>{swatch(UNEXPLAINED)}unexplained</td><td class=n>{report.comparison.unexplained}</td>"
-        "<td>outside every interval that is allowed</td></tr>"
+        "<td>no candidate's interval contains the value</td></tr>"
     )
     stops = ", ".join(f"rgb({int(r)} {int(g)} {int(b)})" for r, g, b in RAMP)
     bar = (
@@ -159,10 +180,10 @@ def _page(report: Report, images: Mapping[str, str], least: float, greatest: flo
 <header><h1>{html.escape(report.title)}</h1><span class="verdict {report.verdict}">{report.verdict}</span></header>
 {f"<ul class=reasons>{reasons}</ul>" if reasons else ""}
 <section class=pictures>
-{figure("result", "Result", " as drawn, encoded for the screen")}
-{figure("reference", "Reference", " the float64 reference's picture")}
-{figure("error", "Error", " largest channel, linear light" + bar)}
-{figure("classes", "Classes", " what can be said of each pixel")}
+{figure("result", "Result", " as drawn, sRGB-encoded")}
+{figure("reference", "Reference", " by the float64 reference, sRGB-encoded")}
+{figure("error", "Error", " of the largest channel, linear" + bar)}
+{figure("classes", "Classes", " how certain the value of each pixel is")}
 </section>
 <section class=columns>
 <div><h2>Pixels</h2><table>{legend}</table></div>

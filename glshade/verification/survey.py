@@ -1,4 +1,4 @@
-"""Survey: the measured error of every model at every rate under every light, on one scene that has what it takes."""
+"""Survey: measures the error of every model at every rate under every light, on one small scene."""
 
 from __future__ import annotations
 
@@ -7,18 +7,30 @@ from dataclasses import dataclass
 from typing import Any
 
 from glshade.brdfs import BRDFS
-from glshade.lights import LIGHTS
-from glshade.scene.scene import Rate, Scene
+from glshade.lights import FALLOFFS, LIGHTS
+from glshade.scene.object import Rate
+from glshade.scene.scene import Scene
 from glshade.verification.verification import verify
 
+# The size of the pictures: width, height [pixels].
 SIZE = (256, 144)
 RATES: tuple[Rate, ...] = ("flat", "gouraud", "phong")
-FALLOFFS = ("none", "1/r", "1/r^2")
 
 
 @dataclass(frozen=True)
-class Row:
-    """One verification. Errors: of interior pixels and seams; tolerance: the largest there; used: the most of any pixel's."""
+class SurveyRow:
+    """The result of one verification. Only interior pixels and seams count in the errors.
+
+    model: the model's name.
+    rate: flat, gouraud or phong.
+    light: the type of the light, followed by its falloff if it has one.
+    worst: the largest error [linear].
+    p999: the error that 99.9 % of the pixels do not exceed [linear].
+    tolerance: the largest tolerance of any pixel [linear].
+    used: the largest ratio of a pixel's error to its own tolerance.
+    ambiguous: the share of the picture's pixels that are ambiguous.
+    verdict: verified, failed or inconclusive.
+    """
 
     model: str
     rate: str
@@ -31,38 +43,43 @@ class Row:
     verdict: str
 
 
-def survey(renderer: Any) -> Iterator[Row]:
-    """Every row, drawn with the Renderer."""
+def survey_models(renderer: Any) -> Iterator[SurveyRow]:
+    """Verifies every model at every rate under every light. renderer: the Renderer that draws the pictures."""
     for model in BRDFS:
         for rate in RATES:
             for name, light in lights().items():
                 verdict = verify(scene(model, light), renderer=renderer, shading=rate)
                 c = verdict.comparison
                 used = float(c.used.max(initial=0.0))
-                yield Row(model, rate, name, c.worst, c.p999, c.tolerance, used, c.ambiguous, verdict.verdict)
+                yield SurveyRow(model, rate, name, c.worst, c.p999, c.tolerance, used, c.ambiguous, verdict.verdict)
 
 
 def lights() -> dict[str, dict[str, Any]]:
-    """name -> one light of each type and falloff, about as bright as each other at the origin."""
-    found: dict[str, dict[str, Any]] = {}
+    """Returns name -> light as in a scene file, one for each type and falloff. All are about equally bright at the origin."""
+    result: dict[str, dict[str, Any]] = {}
     for kind, model in LIGHTS.items():
-        has = model.model_fields
+        keys = model.model_fields
         light: dict[str, Any] = {"type": kind, "colour": (1.0, 0.9, 0.8)}
-        if "position" in has:
+        if "position" in keys:
             light["position"] = (1.5, 2.0, 3.0)
-        if "direction" in has:
+        if "direction" in keys:
             light["direction"] = (-0.4, -0.55, -0.8)
-        if "falloff" not in has:
-            found[kind] = light
+        if "falloff" not in keys:
+            result[kind] = light
             continue
-        for power, falloff in enumerate(FALLOFFS):
-            # 4: the light's distance from the origin, roughly.
-            found[f"{kind} {falloff}" if power else kind] = {**light, "falloff": falloff, "intensity": 4.0**power}
-    return found
+        for falloff, law in FALLOFFS.items():
+            # The light's distance from the origin is about 4. The intensity makes up for the falloff at the origin.
+            name = f"{kind} {falloff}" if law.power else kind
+            result[name] = {**light, "falloff": falloff, "intensity": 4.0**law.power}
+    return result
 
 
 def scene(model: str, light: dict[str, Any]) -> Scene:
-    """A sphere, a torus and a tilted floor of the model at ordinary parameters, in perspective."""
+    """Returns a scene of a sphere, a torus and a floor in perspective.
+
+    model: the model of all three objects. Its parameters are the defaults, except for the colours.
+    light: the only light, as in a scene file.
+    """
     material = {"brdf": model, **_colours(model)}
     objects = [
         {"shape": {"type": "sphere", "segments": 64, "rings": 32}, "transform": {"translate": (-1.1, 0.1, 0.0)}},
@@ -80,10 +97,10 @@ def scene(model: str, light: dict[str, Any]) -> Scene:
 
 
 def _colours(model: str) -> dict[str, Any]:
-    """The model's colours with three channels that are not equal."""
-    found: dict[str, Any] = {}
+    """Returns the model's default colours, tinted: if two channels were exchanged, the verifier would see an error."""
+    result: dict[str, Any] = {}
     for name in BRDFS[model].parameters():
         default = BRDFS[model].model_fields[name].default
         if isinstance(default, tuple):
-            found[name] = tuple(float(c) * share for c, share in zip(default, (1.0, 0.8, 0.6), strict=True))
-    return found
+            result[name] = tuple(float(c) * share for c, share in zip(default, (1.0, 0.8, 0.6), strict=True))
+    return result

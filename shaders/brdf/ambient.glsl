@@ -1,6 +1,6 @@
-#include "lib/frame.glsl"
+#include "surface/frame.glsl"
 
-// Reflects ambient light alone (lecture slide 23): a constant colour, whatever else shines.
+// The model that reflects only ambient light (lecture slide 23), in a constant colour.
 struct Ambient {
     vec3 ka;
 };

@@ -1,13 +1,14 @@
-#include "lib/cos_half.glsl"
-#include "lib/frame.glsl"
+#include "math/cos_half.glsl"
+#include "surface/frame.glsl"
 #include "microfacet/beckmann.glsl"
 #include "microfacet/microfacet_alpha.glsl"
 #include <geometry>
 #include <fresnel>
 #include <diffuse>
 
-// Cook and Torrance 1982: F D G/(4 n.v) with a diffuse base. The paper divides by pi and has no pi in D, four times this;
-// that the 4 belongs there is shown by Walter et al. 2007, eq. 20.
+// The model of Cook and Torrance 1982 with Beckmann's distribution D, Fresnel term F and shadowing G: F D G/(4 n.v), over a
+// diffuse base. The paper divides by pi in place of 4 and has no pi in D, which makes it four times as large. Walter et al.
+// 2007, eq. 20, derive the 4.
 struct Beckmann {
     vec3 kd;
     vec3 eta;
@@ -27,7 +28,8 @@ vec3 brdf_cos(Beckmann m, Frame f, vec3 l, vec3 v) {
     float NoH = (NoL + NoV) / divisor;
     float alpha = microfacet_alpha(m.roughness);
     float specular = d_beckmann(f.n, h, NoH, alpha, visible(NoL, NoV, H2, NoH, alpha));
-    // |H|^2 below 1e-12: l = -v to rounding, where no half vector is. What is not finite above is not chosen here.
+    // Below 1e-12, |H|^2 is rounding error: l = -v, and there is no half vector. The conditions below also drop infinities and
+    // NaN.
     bool lit = NoL > 0.0 && NoV > 0.0;
     return diffuse(m.kd, m.eta, m.k, lit ? NoL : 0.0, max(NoV, 0.0)) +
            fresnel(m.eta, m.k, LoH) * (lit && H2 > 1e-12 ? specular : 0.0);

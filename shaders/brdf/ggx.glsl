@@ -1,11 +1,11 @@
-#include "lib/cos_half.glsl"
-#include "lib/frame.glsl"
-#include "lib/fresnel.glsl"
+#include "math/cos_half.glsl"
+#include "surface/frame.glsl"
+#include "optics/f_schlick.glsl"
 #include <ggx>
 #include <diffuse>
 
-// glTF 2.0, appendix B: kd (1 - metallic)/pi (1 - F) n.l + F D V n.l, F Schlick's of mix(f0, kd, metallic); D V as in
-// microfacet/ggx_*.glsl.
+// The model of glTF 2.0, appendix B: kd (1 - metallic)/pi (1 - F) n.l + F D V n.l. F is Schlick's Fresnel term with the value
+// mix(f0, kd, metallic) at normal incidence, and microfacet/ggx_*.glsl have D V n.l.
 struct Ggx {
     vec3 kd;
     vec3 f0;
@@ -24,7 +24,7 @@ vec3 brdf_cos(Ggx m, Frame f, vec3 l, vec3 v) {
     float LoH = cos_half(l, v, length_H);
     vec3 f0 = mix(m.f0, m.kd, m.metallic);
     float specular = ggx_cos(f, l, v, h, m.roughness, m.anisotropy);
-    // |H|^2 below 1e-12: l = -v to rounding, where no half vector is.
+    // Below 1e-12, |H|^2 is rounding error: l = -v, and there is no half vector.
     bool lit = NoL > 0.0 && NoV > 0.0;
     return diffuse(m.kd * (1.0 - m.metallic), f0, LoH, lit ? NoL : 0.0) +
            f_schlick(f0, LoH) * (lit && H2 > 1e-12 ? specular : 0.0);

@@ -1,10 +1,10 @@
-#include "lib/constants.glsl"
-#include "lib/frame.glsl"
-#include "lib/log1m.glsl"
+#include "math/constants.glsl"
+#include "surface/frame.glsl"
+#include "math/log1m.glsl"
 #include <axes>
 
-// Lafortune, Foo, Torrance and Greenberg 1997:
-// (kd/pi + sum of ks (p + 2)/(2 pi) max(cx lx vx + cy ly vy + cz lz vz, 0)^p) n.l, with |c| at most 1 in each axis.
+// The model of Lafortune, Foo, Torrance and Greenberg 1997 with up to three lobes:
+// (kd/pi + sum of ks (p + 2)/(2 pi) max(cx lx vx + cy ly vy + cz lz vz, 0)^p) n.l. p is the exponent; |cx|, |cy| and |cz| <= 1.
 struct Lafortune {
     vec3 kd;
     vec3 ks_1;
@@ -24,20 +24,21 @@ struct Lafortune {
     float exponent_3;
 };
 
-// max(c.products, 0)^p (p + 2) / 2.
+// Returns one lobe without its colour and without 1/pi: max(c.products, 0)^p (p + 2) / 2.
 float lobe(Axes x, vec3 c, float p) {
     vec3 size = abs(c);
-    // 1 - c.products without its cancellation, as a sum of what is not negative.
+    // s is 1 - c.products without cancellation, as a sum of terms that are not negative.
     float s = 0.5 * dot(size, vec3(c.x < 0.0 ? x.sums.x : x.differences.x, c.y < 0.0 ? x.sums.y : x.differences.y,
                                    c.z < 0.0 ? x.sums.z : x.differences.z)) +
               0.5 * dot(1.0 - size, x.squares);
     float base = dot(c, x.products);
     float log_base = s < 0.25 ? s * log1m_over(s) : log(clamp(base, FLT_MIN, 1.0));
-    // The lobe's root, squared in the end: its tail would vanish below FLT_MIN before p makes it large again.
+    // The square root of the lobe is squared last: its tail would be flushed to 0 before the factor in p makes it large again.
     float root = s < 0.25 || base > 0.0 ? exp(0.5 * p * log_base) : 0.0;
     return (0.5 * p + 1.0) * root * root;
 }
 
+// The generated function lobes() adds up the lobes whose weight is not zero.
 #include <lobes>
 
 vec3 brdf_cos(Lafortune m, Frame f, vec3 l, vec3 v) {

@@ -1,7 +1,7 @@
-#include "lib/constants.glsl"
-#include "lib/frame.glsl"
+#include "math/constants.glsl"
+#include "surface/frame.glsl"
 
-// Ideal diffuse (lecture slides 13-15): kd/pi cos, one-sided.
+// Lambert's model, ideal diffuse reflection (lecture slides 13-15): kd/pi n.l, and 0 from below the surface.
 struct Lambert {
     vec3 kd;
 };

@@ -1,10 +1,10 @@
-#include "lib/cos_half.glsl"
-#include "lib/f0_conductor.glsl"
-#include "lib/frame.glsl"
+#include "math/cos_half.glsl"
+#include "optics/f0_conductor.glsl"
+#include "surface/frame.glsl"
 #include <ggx>
 #include <fresnel>
 
-// F D V n.l: a rough conductor of index eta + i k; D V as in microfacet/ggx_*.glsl.
+// A rough conductor with the refractive index eta + i k: the Fresnel term F times D V n.l. microfacet/ggx_*.glsl have D V n.l.
 struct Metal {
     vec3 eta;
     vec3 k;
@@ -19,7 +19,7 @@ vec3 brdf_cos(Metal m, Frame f, vec3 l, vec3 v) {
     vec3 h = H / max(length_H, 1e-6);
     float LoH = cos_half(l, v, length_H);
     float specular = ggx_cos(f, l, v, h, m.roughness, m.anisotropy);
-    // |H|^2 below 1e-12: l = -v to rounding, where no half vector is.
+    // Below 1e-12, |H|^2 is rounding error: l = -v, and there is no half vector.
     bool lit = dot(f.n, l) > 0.0 && dot(f.n, v) > 0.0 && H2 > 1e-12;
     return fresnel(m.eta, m.k, LoH) * (lit ? specular : 0.0);
 }

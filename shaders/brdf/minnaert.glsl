@@ -1,8 +1,8 @@
-#include "lib/constants.glsl"
-#include "lib/frame.glsl"
-#include "lib/grazing.glsl"
+#include "math/constants.glsl"
+#include "surface/frame.glsl"
+#include "lobe/grazing.glsl"
 
-// Minnaert 1941: kd (k + 1)/(2 pi) ((n.l) (n.v))^(k - 1) n.l.
+// The model of Minnaert 1941: kd (k + 1)/(2 pi) ((n.l) (n.v))^(k - 1) n.l.
 struct Minnaert {
     vec3 kd;
     float k;
@@ -11,8 +11,9 @@ struct Minnaert {
 vec3 brdf_cos(Minnaert m, Frame f, vec3 l, vec3 v) {
     float NoL = dot(f.n, l);
     float NoV = dot(f.n, v);
-    // Below k = 1 there is a pole where a cosine is 0, and the power is x^k / x: a power of -1 would multiply the rounding of
-    // the logarithms by 1, and x^k does by k. Two logarithms: the product of small cosines would vanish.
+    // For k < 1 the power has a pole where a cosine is 0. There it is computed as x^k / x, because the exponent k amplifies the
+    // rounding of the logarithms less than k - 1 does. The logarithms are added, because the product of two small cosines would
+    // be flushed to 0.
     bool pole = m.k < 1.0;
     float a = max(NoL, pole ? GRAZING : FLT_MIN);
     float b = max(NoV, pole ? GRAZING : FLT_MIN);

@@ -1,7 +1,7 @@
-#include "lib/constants.glsl"
-#include "lib/frame.glsl"
+#include "math/constants.glsl"
+#include "surface/frame.glsl"
 
-// Oren and Nayar 1994, eq. 31: kd/pi (A + B max(0, cos(dphi)) sin(alpha) tan(beta)) n.l.
+// The qualitative model of Oren and Nayar 1994, eq. 31: kd/pi (A + B max(0, cos(dphi)) sin(alpha) tan(beta)) n.l.
 struct OrenNayarQualitative {
     vec3 kd;
     float sigma;
@@ -10,7 +10,8 @@ struct OrenNayarQualitative {
 vec3 brdf_cos(OrenNayarQualitative m, Frame f, vec3 l, vec3 v) {
     float NoL = dot(f.n, l);
     float NoV = dot(f.n, v);
-    // cos(dphi) sin(alpha) sin(beta) = l.v - n.l n.v, of the parts across n: no azimuth, so the pole is a place like any other.
+    // `product` is cos(dphi) sin(alpha) sin(beta) = l.v - n.l n.v, computed from the projections of l and v onto the surface.
+    // It needs no azimuth, which is undefined for l = n and v = n.
     float product = dot(l - NoL * f.n, v - NoV * f.n);
     float s2 = m.sigma * m.sigma;
     float a = 1.0 - 0.5 * s2 / (s2 + 0.33);

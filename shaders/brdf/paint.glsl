@@ -1,8 +1,8 @@
-#include "lib/constants.glsl"
-#include "lib/frame.glsl"
+#include "math/constants.glsl"
+#include "surface/frame.glsl"
 
-// Paint, times n.l: pigment (ideal diffuse) or metal flakes (GGX, Walter et al. 2007, with Schlick's Fresnel) under a clear
-// coat (GGX with the exact Fresnel) that dims them by 1 - coat F on the way in and on the way out.
+// Car paint, times n.l: pigment (ideal diffuse) and metal flakes (GGX, Walter et al. 2007, with Schlick's Fresnel term) under a
+// clear coat (GGX with the exact Fresnel term F), which dims them by 1 - coat F on the way in and on the way out.
 struct Paint {
     vec3 kd;
     vec3 flake_colour;
@@ -13,14 +13,15 @@ struct Paint {
     float coat_roughness;
 };
 
-// The lobes whose weight is not zero, and paint_cos, which adds them up; h means nothing where there is no half vector.
+// The generated code has the lobes whose weight is not zero, and paint_cos, which adds them up. h is invalid where there is no
+// half vector.
 #include <lobes>
 
 vec3 brdf_cos(Paint m, Frame f, vec3 l, vec3 v) {
     float NoL = dot(f.n, l);
     float NoV = dot(f.n, v);
     vec3 H = l + v;
-    // |H|^2 below 1e-12: l = -v to rounding, where no half vector is.
+    // Below 1e-12, |H|^2 is rounding error: l = -v, and there is no half vector.
     float H2 = dot(H, H);
     float inverse_H = inversesqrt(max(H2, 1e-12));
     float LoH = min(0.5 * H2 * inverse_H, 1.0);  // l.h = |H| / 2

@@ -1,7 +1,7 @@
-#include "lib/frame.glsl"
+#include "surface/frame.glsl"
 
-// Burley 2012, section 5: Disney's principled model as it was published, with isotropic, separable shadowing of width
-// (1/2 + roughness/2)^2; later revisions changed that. kd is the base colour, linear.
+// Disney's principled model as published in Burley 2012, section 5, with isotropic, separable shadowing of width
+// (1/2 + roughness/2)^2, which later revisions changed. kd is the linear base colour.
 struct Principled {
     vec3 kd;
     float metallic;
@@ -16,15 +16,15 @@ struct Principled {
     float clearcoat_gloss;
 };
 
-// The lobes whose weight is not zero, and principled_cos, which adds them up. fh = (1 - l.h)^5; facet is 0 where there is no
-// half vector, else 1.
+// The generated code has the lobes whose weight is not zero, and principled_cos, which adds them up. Its argument fh is
+// (1 - l.h)^5, and facet is 0 where there is no half vector, else 1.
 #include <lobes>
 
 vec3 brdf_cos(Principled m, Frame f, vec3 l, vec3 v) {
     float NoL = dot(f.n, l);
     float NoV = dot(f.n, v);
     vec3 H = l + v;
-    // |H|^2 below 1e-12: l = -v to rounding, where no half vector is.
+    // Below 1e-12, |H|^2 is rounding error: l = -v, and there is no half vector.
     float H2 = dot(H, H);
     float inverse_H = inversesqrt(max(H2, 1e-12));
     float x = 1.0 - min(0.5 * H2 * inverse_H, 1.0);  // l.h = |H| / 2

@@ -1,11 +1,11 @@
-#include "lib/cos_half.glsl"
-#include "lib/frame.glsl"
-#include "lib/fresnel.glsl"
+#include "math/cos_half.glsl"
+#include "surface/frame.glsl"
+#include "optics/f_schlick.glsl"
 #include "microfacet/ggx_isotropic.glsl"
 #include <diffuse>
 
-// Belcour et al. 2014, eq. 3: GGX about the back vector K = r + v, r the mirror direction of l, in place of l + v. Light goes
-// back where it came from. Over a diffuse base.
+// The retroreflective model of Belcour et al. 2014, eq. 3, over a diffuse base: GGX with the back vector K = r + v in place of
+// l + v, where r is l mirrored at n. It reflects light back to where it came from.
 struct RetroGgx {
     vec3 kd;
     vec3 ks;
@@ -22,7 +22,7 @@ vec3 brdf_cos(RetroGgx m, Frame f, vec3 l, vec3 v) {
     vec3 k = K / max(length_K, 1e-6);
     float RoK = cos_half(r, v, length_K);
     float specular = ggx_cos(f, r, v, k, m.roughness, 0.0);
-    // |K|^2 below 1e-12: l = v in the horizon to rounding, where no back vector is.
+    // Below 1e-12, |K|^2 is rounding error: l = v lies in the surface, and there is no back vector.
     bool lit = NoL > 0.0 && NoV > 0.0;
     return diffuse(m.kd, m.ks, lit ? NoL : 0.0, max(NoV, 0.0)) + f_schlick(m.ks, RoK) * (lit && K2 > 1e-12 ? specular : 0.0);
 }

@@ -1,8 +1,9 @@
-#include "lib/constants.glsl"
-#include "lib/frame.glsl"
-#include "lib/gaussian.glsl"
+#include "math/constants.glsl"
+#include "surface/frame.glsl"
+#include "lobe/gaussian.glsl"
 
-// Ward 1992, eq. 5a: (kd/pi + ks exp(-slope^2) / (4 pi alpha_x alpha_y sqrt((n.l) (n.v)))) n.l.
+// The model of Ward 1992, eq. 5a: (kd/pi + ks exp(-slope^2) / (4 pi alpha_x alpha_y sqrt((n.l) (n.v)))) n.l.
+// slope is the half vector's slope, scaled as in lobe/gaussian.glsl.
 struct Ward {
     vec3 kd;
     vec3 ks;

@@ -1,8 +1,9 @@
-#include "lib/constants.glsl"
-#include "lib/frame.glsl"
-#include "lib/gaussian.glsl"
+#include "math/constants.glsl"
+#include "surface/frame.glsl"
+#include "lobe/gaussian.glsl"
 
-// Duer 2006: (kd/pi + ks exp(-slope^2) / (4 pi alpha_x alpha_y (n.l) (n.v))) n.l.
+// Ward's model as corrected by Duer 2006: (kd/pi + ks exp(-slope^2) / (4 pi alpha_x alpha_y (n.l) (n.v))) n.l.
+// slope is the half vector's slope, scaled as in lobe/gaussian.glsl.
 struct WardDuer {
     vec3 kd;
     vec3 ks;

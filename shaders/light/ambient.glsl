@@ -1,8 +1,8 @@
-// Light from everywhere alike (lecture slide 23: a hack, and needed). It has no direction, so it takes no point.
+// Ambient light: the same from all directions, so its strength is the same for every normal.
 struct AmbientLight {
     vec3 intensity;
 };
 
-vec3 illuminate(AmbientLight light) {
+vec3 illuminate(AmbientLight light, vec3 n) {
     return light.intensity;
 }

@@ -1,4 +1,4 @@
-// A light at infinity: the same direction and strength everywhere (lecture slide 49).
+// A directional light: infinitely far away, so its direction and strength are the same everywhere (lecture slide 49).
 struct DirectionalLight {
     vec3 intensity;
     vec3 l;

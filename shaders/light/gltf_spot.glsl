@@ -1,7 +1,7 @@
-#include "lib/unit.glsl"
+#include "math/unit.glsl"
 
-// glTF's spot light (KHR_lights_punctual): the square of how far cos has come from the outer angle's to the inner one's.
-// 1 - cos is compared, not cos, as in spot.glsl.
+// The spot light of glTF (KHR_lights_punctual). Its strength is x^2, where x is linear in cos: 0 at cos(outer) and 1 at
+// cos(inner). As in spot.glsl, 1 - cos is used in place of cos.
 struct GltfSpotLight {
     vec3 intensity;
     float r_min;

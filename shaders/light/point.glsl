@@ -1,6 +1,7 @@
-#include "lib/unit.glsl"
+#include "math/unit.glsl"
 
-// A light at one place, alike in all directions (lecture slide 49). At the light itself l is (0, 0, 0): no light.
+// A point light, which shines equally in all directions (lecture slide 49). At the light's own position l is (0, 0, 0), so that
+// no light is reflected.
 struct PointLight {
     vec3 intensity;
     float r_min;

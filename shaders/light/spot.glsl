@@ -1,7 +1,8 @@
-#include "lib/unit.glsl"
+#include "math/unit.glsl"
 
-// A point light that shines into a cone (lecture slide 52): whole within the inner angle, none past the outer, smoothstep
-// between. 1 - cos is compared, not cos: as |a - b|^2 / 2 it keeps its digits in cones of 1e-4 rad.
+// A spot light: a point light that shines into a cone (lecture slide 52), with full strength within the inner angle, 0
+// beyond the outer angle, and smoothstep between them. 1 - cos is used in place of cos, because computed as |a - b|^2 / 2 it
+// keeps its digits for cones as narrow as 1e-4 rad.
 struct SpotLight {
     vec3 intensity;
     float r_min;

@@ -1,8 +1,8 @@
-#include "lib/constants.glsl"
+#include "math/constants.glsl"
 
-// Burley 2012, section 5.3, times n.l: the diffuse lobe of reflectance 1. Fresnel's darkening at grazing angles is turned round
-// towards the light by roughness. The square of l.h is |l + v|^2 / 4.
-float burley(float roughness, float NoL, float NoV, float LoH2) {
+// The diffuse lobe of Burley 2012, section 5.3, for reflectance 1, times n.l. Fresnel reflection makes smooth surfaces darker
+// at grazing angles; rough ones are brighter toward the light. LoH2 = (l.h)^2 = |l + v|^2 / 4.
+float burley_diffuse(float roughness, float NoL, float NoV, float LoH2) {
     float rise = 2.0 * roughness * LoH2 - 0.5;  // F_D90 - 1
     float a = 1.0 - NoL;
     float b = 1.0 - NoV;

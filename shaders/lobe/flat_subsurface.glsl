@@ -1,7 +1,8 @@
-#include "lib/constants.glsl"
+#include "math/constants.glsl"
 
-// Burley 2012, section 5.3: diffuse of reflectance 1 as the flat one that Hanrahan and Krueger 1993 have for light scattered
-// below the surface, times n.l: 1.25/pi (Fss (1/(n.l + n.v) - 1/2) + 1/2) n.l. Finite where both graze: n.l/(n.l + n.v) <= 1.
+// The subsurface lobe of Burley 2012, section 5.3, for reflectance 1, times n.l: 1.25/pi (Fss (1/(n.l + n.v) - 1/2) + 1/2) n.l.
+// `fss` below is Fss. The lobe approximates the flat lobe of Hanrahan and Krueger 1993 for light scattered below the surface.
+// It is finite where both directions graze, because n.l/(n.l + n.v) <= 1.
 float flat_subsurface(float roughness, float NoL, float NoV, float LoH2) {
     float rise = roughness * LoH2 - 1.0;  // F_ss90 - 1
     float a = 1.0 - NoL;

@@ -1,10 +1,10 @@
 #include "lobe/smith_separate.glsl"
 
-// The narrowest highlight of Burley's reference implementation.
+// The shadowing of the base layer's highlight in Disney's model. LEAST_ALPHA is the smallest width in Burley's implementation.
 const float LEAST_ALPHA = 0.001;
 
-// Burley 2012, section 5.6: G / (4 n.l n.v). The width is kept large, so that smooth surfaces do not gain too much at grazing
-// angles, and alike in all directions.
+// Returns G / (4 n.l n.v) for the shadowing G of Burley 2012, section 5.6. The width of G is at least 1/4, so that smooth
+// surfaces do not get too bright at grazing angles, and G is the same in all directions.
 float gtr2_visible(float NoL, float NoV, float roughness) {
     float alpha = 0.5 + 0.5 * roughness;
     alpha *= alpha;

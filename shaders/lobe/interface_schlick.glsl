@@ -1,4 +1,5 @@
-// The smooth interface of a dielectric by Schlick 1994, eq. 15, in place of Fresnel's formulas: f0 = ((eta - 1)/(eta + 1))^2.
+// The smooth interface of a dielectric by Schlick 1994, eq. 15, which replaces lobe/interface_exact.glsl. interface_f0 returns
+// the reflectance at normal incidence, f0 = ((eta - 1)/(eta + 1))^2.
 float interface_f0(float eta) {
     float z = (eta - 1.0) / (eta + 1.0);
     return z * z;
@@ -12,7 +13,7 @@ float interface_reflects(float LoH, float eta) {
     return f0 + (1.0 - f0) * (x2 * x2 * x);
 }
 
-// The share that passes: 1 - (1 - c)^5 by its factors, so that small cosines are not lost in the difference from 1.
+// The share of light that passes. 1 - (1 - c)^5 is computed in factored form, so that small cosines keep their digits.
 float interface_passes(float c, float eta) {
     float a = 1.0 - c;
     return (1.0 - interface_f0(eta)) * c * (1.0 + a * (1.0 + a * (1.0 + a * (1.0 + a))));

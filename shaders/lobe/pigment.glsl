@@ -1,6 +1,6 @@
-#include "lib/constants.glsl"
+#include "math/constants.glsl"
 
-// The part of paint that the flakes leave to the pigment: ideal diffuse, times n.l.
+// The pigment of paint, on the share of the surface without flakes: ideal diffuse reflection, times n.l.
 vec3 pigment(Paint m, float NoL) {
     return m.kd * ((1.0 - m.flakes) * INV_PI * NoL);
 }

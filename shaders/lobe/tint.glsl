@@ -1,6 +1,6 @@
-#include "lib/constants.glsl"
+#include "math/constants.glsl"
 
-// A colour over its luminance, as near as Burley 2012 takes it: hue and saturation. White for black.
+// The hue and saturation of a colour: the colour divided by its luminance, as Burley 2012 approximates it. Black gives white.
 vec3 tint(vec3 kd) {
     float luminance = dot(vec3(0.3, 0.6, 0.1), kd);
     return luminance > FLT_MIN ? kd / luminance : vec3(1.0);

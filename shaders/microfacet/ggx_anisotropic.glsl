@@ -1,18 +1,19 @@
-#include "lib/constants.glsl"
-#include "lib/frame.glsl"
+#include "math/constants.glsl"
+#include "surface/frame.glsl"
 #include "microfacet/microfacet_alpha.glsl"
 
-// GGX with a width along each tangent direction: D V n.l [1/sr], V = G2 / (4 n.l n.v), G2 Smith's, height-correlated
-// (Burley 2012, eq. 13; Heitz 2014, eq. 99). alpha_x = alpha / aspect and alpha_y = alpha aspect,
-// aspect = sqrt(1 - 0.9 anisotropy): highlights are longer along the tangent. anisotropy in [0, 1].
-// h: (l + v) / |l + v|. Finite for any l, v, h; what is below the horizon is for the caller to leave out.
-// The cosine is in it because V alone overflows where both directions graze.
+// Anisotropic GGX: its distribution D of microfacet normals times V n.l [1/sr]. V = G2 / (4 n.l n.v), and G2 is Smith's
+// height-correlated shadowing (Burley 2012, eq. 13; Heitz 2014, eq. 99). alpha_x = alpha / aspect and alpha_y = alpha aspect
+// with aspect = sqrt(1 - 0.9 anisotropy), for anisotropy in [0, 1]: highlights are longer along the tangent.
+// h is (l + v) / |l + v|. The result is finite for any l, v and h; the caller excludes directions below the horizon. The
+// function includes n.l, because V alone overflows where both directions graze.
 float ggx_cos(Frame f, vec3 l, vec3 v, vec3 h, float roughness, float anisotropy) {
     float a = microfacet_alpha(roughness);
     float aspect = sqrt(1.0 - 0.9 * anisotropy);
     float ax = a / aspect;
     float ay = a * aspect;
-    // (h.t / ax)^2 + (h.b / ay)^2 + (h.n)^2. h - n is exact for near vectors, and t and b are perpendicular to n.
+    // q = (h.t / ax)^2 + (h.b / ay)^2 + (h.n)^2, computed from h - n, which is exact for nearly equal vectors and has the same
+    // products with t and b, since both are perpendicular to n.
     vec3 d = h - f.n;
     float NoH = 1.0 - 0.5 * dot(d, d);
     vec3 x = vec3(dot(f.t, d) / ax, dot(f.b, d) / ay, NoH);

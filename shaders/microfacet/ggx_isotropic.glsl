@@ -1,16 +1,17 @@
-#include "lib/constants.glsl"
-#include "lib/frame.glsl"
+#include "math/constants.glsl"
+#include "surface/frame.glsl"
 #include "microfacet/microfacet_alpha.glsl"
 
-// GGX: D V n.l [1/sr], V = G2 / (4 n.l n.v), G2 Smith's, height-correlated (Walter et al. 2007, eq. 33; Heitz 2014, eq. 99).
-// The same arguments as in ggx_anisotropic.glsl, so that a slot can choose; f.t, f.b and anisotropy are not looked at.
-// h: (l + v) / |l + v|. Finite for any l, v, h; what is below the horizon is for the caller to leave out.
-// The cosine is in it because V alone overflows where both directions graze.
+// Isotropic GGX: its distribution D of microfacet normals times V n.l [1/sr]. V = G2 / (4 n.l n.v), and G2 is Smith's
+// height-correlated shadowing (Walter et al. 2007, eq. 33; Heitz 2014, eq. 99). The function has the signature of the one in
+// ggx_anisotropic.glsl, so that a material can choose between them; f.t, f.b and anisotropy are not used.
+// h is (l + v) / |l + v|. The result is finite for any l, v and h; the caller excludes directions below the horizon. The
+// function includes n.l, because V alone overflows where both directions graze.
 float ggx_cos(Frame f, vec3 l, vec3 v, vec3 h, float roughness, float anisotropy) {
     float a = microfacet_alpha(roughness);
     float a2 = a * a;
     float rest = (1.0 - a) * (1.0 + a);
-    // alpha^2 cos^2 + sin^2 has its digits only if sin^2 has: from h - n, of near vectors exact.
+    // q = alpha^2 cos^2 + sin^2 of the angle between n and h. sin^2 comes from h - n, which is exact for nearly equal vectors.
     vec3 d = h - f.n;
     float s = 0.5 * dot(d, d);
     float q = a2 + rest * (s * (2.0 - s));

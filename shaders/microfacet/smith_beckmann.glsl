@@ -1,12 +1,12 @@
-#include "lib/constants.glsl"
+#include "math/constants.glsl"
 
-// ierfc(x) = exp(-x^2)/sqrt(pi) - x erfc(x), the integral of erfc from x on, for x >= 0: a least-maximum fit of the form
-// (1 + y)^-16 / sqrt(pi), y a polynomial. It is off by 2e-8 of 2 x + ierfc(x), and with its roundings by 1.7e-7; that is the
-// share of the shadowing it errs by.
+// Smith's shadowing for Beckmann's distribution needs ierfc(x) = exp(-x^2)/sqrt(pi) - x erfc(x), the integral of erfc from x to
+// infinity, for x >= 0. The function below is a minimax fit (1 + y)^-16 / sqrt(pi) with a polynomial y. Relative to
+// 2 x + ierfc(x), its error is 2e-8, and 1.7e-7 with roundings. This is also the relative error of the shadowing.
 float ierfc(float x) {
     float y = 9.39938925e-3 + x * (9.85803956e-4 + x * (1.21520052e-4 + x * 6.58739504e-5));
     y = x * (0.110778281 + x * (0.0418121851 + x * y));
-    // (1 + y)^2 = 1 + y (2 + y): of a small y no digit is lost to the 1.
+    // Each line squares 1 + y: (1 + y)^2 = 1 + y (2 + y). Keeping y alone preserves its digits where it is small.
     y *= 2.0 + y;
     y *= 2.0 + y;
     y *= 2.0 + y;
@@ -14,13 +14,13 @@ float ierfc(float x) {
     return 0.564189584 / (1.0 + y);
 }
 
-// G2/(4 n.v) with Smith's shadowing for Beckmann's distribution, height-correlated: 1/(1 + Lambda(l) + Lambda(v))
-// (Smith 1967; Heitz 2014, eq. 99). Lambda = ierfc(x)/(2 x), x = cos/(alpha sin): multiplied by the cosines it is
-// finite in the horizon.
+// G2/(4 n.v) with Smith's height-correlated shadowing for Beckmann's distribution, G2 = 1/(1 + Lambda(l) + Lambda(v))
+// (Smith 1967; Heitz 2014, eq. 99). Lambda = ierfc(x)/(2 x) with x = cos/(alpha sin). The code multiplies by the cosines, so
+// that the result is finite at the horizon.
 float visible(float NoL, float NoV, float H2, float NoH, float alpha) {
     vec2 c = vec2(NoL, NoV);
     vec2 spread = alpha * sqrt(max((1.0 - c) * (1.0 + c), 0.0));
-    // Beyond 8, ierfc is 0 to float32 beside 1.
+    // For x > 8, ierfc(x) is negligible beside 1 in float32.
     vec2 x = min(c / max(spread, FLT_MIN), 8.0);
     float Ll = spread.x * ierfc(x.x);
     float Lv = spread.y * ierfc(x.y);

@@ -1,4 +1,4 @@
-// Linear Rec. 709, premultiplied.
+// The output in linear Rec. 709, premultiplied.
 vec4 encode(vec3 c, float alpha) {
     return vec4(c * alpha, alpha);
 }

@@ -1,6 +1,6 @@
-#include "lib/colour.glsl"
+#include "output/encoding.glsl"
 
-// sRGB-encoded, premultiplied before the encoding.
+// The output premultiplied in linear light and then sRGB-encoded.
 vec4 encode(vec3 c, float alpha) {
     return vec4(linear_to_srgb(c * alpha), alpha);
 }

@@ -1,6 +1,6 @@
 #version 330 core
-// A model many times a pixel, for its cost.
-#include "lib/evaluations.glsl"
+// Evaluates a model many times per pixel, to time it in the fragment stage.
+#include "driver/evaluations.glsl"
 
 out vec4 o_value;
 

@@ -1,6 +1,6 @@
 #version 330 core
-// A model many times a vertex, for its cost.
-#include "lib/evaluations.glsl"
+// Evaluates a model many times per vertex, to time it in the vertex stage.
+#include "driver/evaluations.glsl"
 
 out vec3 v_value;
 

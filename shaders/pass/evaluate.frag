@@ -1,5 +1,5 @@
 #version 330 core
-// A model at given directions, one pixel each.
+// Evaluates a model at one pair of directions per pixel.
 #include <model>
 
 uniform sampler2D u_l;

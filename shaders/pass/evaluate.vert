@@ -1,5 +1,5 @@
 #version 330 core
-// A model at given directions, one vertex each, for transform feedback.
+// Evaluates a model at one pair of directions per vertex. Transform feedback captures the values.
 #include <model>
 
 in vec3 a_l;

@@ -1,4 +1,5 @@
 #version 330 core
+// Flat shading: every pixel of a triangle gets the colour that the vertex stage has computed.
 #include <surface>
 #include <output>
 

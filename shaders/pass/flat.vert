@@ -1,7 +1,7 @@
 #version 330 core
-// Flat shading (lecture slide 56): the model is evaluated once a triangle, at its centroid with its face normal.
-// All three corners carry the same centroid and normal.
-#include "lib/clip.glsl"
+// Flat shading (lecture slide 56): the model is evaluated once per triangle, at its centroid with its face normal. All three
+// corners carry the same centroid and normal.
+#include "surface/placement.glsl"
 #include <surface>
 
 flat out vec3 v_radiance;

@@ -1,6 +1,7 @@
 #version 330 core
-// Flat shading of a surface seen from both sides: a plane faces the viewer everywhere or nowhere.
-#include "lib/clip.glsl"
+// Flat shading of a surface that is seen from both sides. The vertex stage can decide which side is seen, because a plane shows
+// the same side to the viewer everywhere.
+#include "surface/placement.glsl"
 #include <surface>
 
 flat out vec3 v_radiance;

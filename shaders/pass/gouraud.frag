@@ -1,4 +1,5 @@
 #version 330 core
+// Gouraud shading: a pixel gets the interpolated colour of the vertices.
 #include <surface>
 #include <output>
 

@@ -1,6 +1,6 @@
 #version 330 core
 // Gouraud shading (lecture slide 60): the model is evaluated at every vertex, and its colours are interpolated.
-#include "lib/clip.glsl"
+#include "surface/placement.glsl"
 #include <surface>
 
 centroid out vec3 v_radiance;

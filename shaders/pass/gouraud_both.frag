@@ -1,4 +1,5 @@
 #version 330 core
+// Gouraud shading of a surface that is seen from both sides: a pixel gets the interpolated colour of the side that it shows.
 #include <surface>
 #include <output>
 

@@ -1,6 +1,7 @@
 #version 330 core
-// Gouraud shading of a surface seen from both sides: a vertex does not know which, so it is shaded once for each.
-#include "lib/clip.glsl"
+// Gouraud shading of a surface that is seen from both sides. The vertex stage does not know which side a pixel shows, so it
+// evaluates the model for both.
+#include "surface/placement.glsl"
 #include <surface>
 
 centroid out vec3 v_front;

@@ -1,4 +1,5 @@
 #version 330 core
+// Phong shading (lecture slide 61): the model is evaluated at every pixel.
 #include <surface>
 #include <output>
 

@@ -1,6 +1,6 @@
 #version 330 core
-// Phong shading (lecture slide 61): the model is evaluated at every pixel; this stage only places and hands on.
-#include "lib/clip.glsl"
+// Phong shading (lecture slide 61): this stage transforms the vertices; the fragment stage evaluates the model.
+#include "surface/placement.glsl"
 #include <surface>
 
 void main() {

@@ -1,4 +1,5 @@
 #version 330 core
+// Phong shading of a surface that is seen from both sides: the normal is reversed where the back is seen.
 #include <surface>
 #include <output>
 

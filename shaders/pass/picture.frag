@@ -1,5 +1,5 @@
 #version 330 core
-// From linear premultiplied light to the numbers of an 8-bit picture, with straight alpha.
+// Encodes a picture in linear premultiplied light for 8 bits, with straight alpha.
 #include <output>
 
 uniform sampler2D u_linear;

@@ -1,5 +1,5 @@
 #version 330 core
-// One triangle that covers the whole picture, from no buffer at all.
+// Draws one triangle that covers the whole picture. It needs no vertex buffer.
 void main() {
     gl_Position = vec4(4.0 * float(gl_VertexID & 1) - 1.0, 4.0 * float(gl_VertexID >> 1) - 1.0, 0.0, 1.0);
 }

@@ -1,6 +1,6 @@
-#include "lib/unit.glsl"
+#include "math/unit.glsl"
 
-// Positions are relative to the eye, so the way to the viewer is the way back.
+// The direction to the viewer of a perspective view. Positions are relative to the eye, so this is the direction of -p.
 vec3 viewer(vec3 p) {
     return unit(-p);
 }

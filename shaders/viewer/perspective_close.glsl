@@ -1,6 +1,6 @@
-#include "lib/unit_scaled.glsl"
+#include "math/unit_scaled.glsl"
 
-// As in perspective.glsl, where the near plane is so close that the square of the way is lost beside FLT_MIN.
+// The direction to the viewer, as in perspective.glsl, for a near plane so close that |p|^2 may be as small as FLT_MIN.
 vec3 viewer(vec3 p) {
     return unit_scaled(-p);
 }

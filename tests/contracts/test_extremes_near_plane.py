@@ -1,4 +1,4 @@
-"""Law: triangles behind, across, in and touching the near plane, and about the eye, are cut as the reference cuts them."""
+"""Property: the near plane clips triangles behind, across, in and at it, and around the eye, as it does in the reference."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from explained import BALL, CAMERA, SUN, everywhere, scene, triangles
+from support.judge import BALL, CAMERA, SUN, judge_all, scene, triangles
 
 from glshade import Renderer
 
@@ -16,7 +16,8 @@ AT_ONE: dict[str, Any] = {"eye": (0.0, 0.0, 1.0), "target": (0.0, 0.0, 0.0), "fo
 AT_ORIGIN: dict[str, Any] = {"eye": (0.0, 0.0, 0.0), "target": (0.0, 0.0, -1.0), "fov": 90, "near": 1e-4, "far": 100.0}
 WIDE: dict[str, Any] = {**CAMERA, "near": 1e-4, "far": 1e9}
 
-# name -> corners, camera, whether something must be seen, or must not; None where the plane itself decides.
+# name -> corners, camera, and whether something must be seen; None where rounding decides, because the triangle lies in a
+# plane.
 CASES: dict[str, tuple[list[tuple[float, float, float]], dict[str, Any], bool | None]] = {
     "behind": ([(-1, -1, 6), (1, -1, 7), (0, 1, 8)], CAMERA, False),
     "across the near plane": ([(-3, -1, -2), (3, -1.5, -2), (0, -1, 9)], {**CAMERA, "near": 0.1, "far": 100.0}, True),
@@ -35,7 +36,7 @@ CASES: dict[str, tuple[list[tuple[float, float, float]], dict[str, Any], bool | 
 @pytest.mark.parametrize("case", CASES)
 def test_cut_alike(case: str, renderer: Renderer) -> None:
     corners, camera, seen = CASES[case]
-    drawn, worst = everywhere(lambda m: scene(triangles(corners, m), [SUN], camera=camera), renderer)
+    drawn, worst = judge_all(lambda m: scene(triangles(corners, m), [SUN], camera=camera), renderer)
     assert not worst > WORST
     if seen is not None:
         assert (drawn > 20) if seen else drawn == 0
@@ -43,20 +44,21 @@ def test_cut_alike(case: str, renderer: Renderer) -> None:
 
 def test_from_inside(renderer: Renderer) -> None:
     lamp = {"type": "point", "position": (0.1, 0.2, 0.3), "falloff": "1/r^2"}
-    drawn, worst = everywhere(lambda m: scene({**BALL, "material": m}, [lamp], camera={**AT_ORIGIN, "near": None}), renderer)
+    drawn, worst = judge_all(lambda m: scene({**BALL, "material": m}, [lamp], camera={**AT_ORIGIN, "near": None}), renderer)
     assert drawn == 48 * 48
     assert worst <= WORST
 
 
 @pytest.mark.parametrize("kind", ["perspective", "orthographic"])
 def test_near_1e_4_and_far_1e9(kind: str, renderer: Renderer) -> None:
-    """Near things hide far ones, though depth runs over 13 decades."""
+    """Near objects hide far ones, although depths span 13 decades."""
     camera = {**{k: CAMERA[k] for k in ("eye", "target")}, "type": kind, "near": 1e-4, "far": 1e9}
     camera |= {"fov": 30} if kind == "perspective" else {"height": 3.0}
-    # In parallel view as large as the picture: float32 clipping has no digits for the edges of what is 1e7 times as large.
+    # In the orthographic view the cube is only as large as the picture: clipping in float32 has no digits left for edges that
+    # are 1e7 times as long.
     place = tuple(float(c) for c in -1e8 * np.array(CAMERA["eye"]) / np.linalg.norm(CAMERA["eye"]))
     beyond = {"shape": "cube", "transform": {"translate": place, "scale": 6e7 if kind == "perspective" else 1e3}}
-    drawn, worst = everywhere(
+    drawn, worst = judge_all(
         lambda m: scene([{**BALL, "material": m}, {**beyond, "material": m}], [SUN], camera=camera), renderer
     )
     assert drawn == 48 * 48

@@ -1,4 +1,4 @@
-"""Law: the GLSL function, in the vertex and in the fragment stage, has the value of the float64 one."""
+"""Property: a model's GLSL function has the value of its float64 function, in the vertex and in the fragment stage."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from extremes import FACTOR, ORDINARY, exact
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import directions, materials
+from support.extremes import FACTOR, ORDINARY, exact
+from support.strategies import directions, materials
 
 from glshade import BRDFS, Renderer, evaluate
 
@@ -21,13 +21,13 @@ from glshade import BRDFS, Renderer, evaluate
 def test_gpu_equals_reference(name: str, on: Any, renderer: Renderer, data: Any, seed: int) -> None:
     material = data.draw(materials(name))
     l = directions(512, seed)
-    # Half of the viewers look into the lobe, where the models have their slopes.
+    # Half of the viewers look into the lobe, where the values of the models change most.
     near_mirror = l[:256] * np.float32([-1, -1, 1]) + np.random.default_rng(seed).normal(scale=0.05, size=(256, 3))
     near_mirror[:, 2] = np.abs(near_mirror[:, 2])
     near_mirror /= np.linalg.norm(near_mirror, axis=1, keepdims=True)
     v = np.concatenate([near_mirror, directions(256, seed + 1)]).astype(np.float32)
     value, conditioning = exact(material, l, v)
-    # 2e-6, or where rounding the inputs moves the value by more, as it does on the flank of a narrow lobe: as much as that.
+    # On the flank of a narrow lobe, rounding the inputs changes the value by more than 2e-6, and a larger error is allowed.
     enough = np.maximum(ORDINARY * np.maximum(1, np.abs(value)), FACTOR * conditioning)
     error = np.abs(evaluate(material, l, v, on=on, context=renderer.context) - value) / enough
     worst = np.unravel_index(np.argmax(error), error.shape)

@@ -1,5 +1,7 @@
-"""Law: a model that does not declare itself anisotropic is the same however the surface is turned about its normal;
-one that does is not, and becomes so where its two widths are equal."""
+"""Property: turning the surface about its normal changes a model only if it declares itself anisotropic.
+
+An anisotropic model becomes isotropic where its two widths are equal.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from extremes import at_extremes
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import directions, materials
+from support.extremes import at_extremes
+from support.strategies import directions, materials
 
 from glshade import BRDFS, Renderer, evaluate
 
@@ -21,7 +23,7 @@ STAGES = ["reference", "vertex", "fragment"]
 
 
 def change(material: Any, angle: float, on: Any, renderer: Renderer) -> float:
-    """How much f cos changes when both directions turn by `angle` [rad], relative to max(1, f cos)."""
+    """Returns the change of f cos when both directions turn by `angle` [rad], relative to max(1, f cos)."""
     c, s = math.cos(angle), math.sin(angle)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     l, v = directions(256, 1), directions(256, 2)
@@ -31,13 +33,14 @@ def change(material: Any, angle: float, on: Any, renderer: Renderer) -> float:
     return float(np.max(np.abs(after - before) / np.maximum(1, np.abs(before))))
 
 
-# Turned directions are rounded to float32, 6e-8 each; a lobe of exponent 1e4 at the edge of its slope (at an angle of
-# 1 / sqrt(p), of slope sqrt(p)) makes 100 times that of it, and its peak may be 100 or so above 1.
+# Turned directions are rounded to float32, with an error of 6e-8 each. A lobe of exponent p is steepest at the angle
+# 1 / sqrt(p), where its relative slope is sqrt(p). So a lobe of exponent 1e4 multiplies the error by 100, and its peak may be
+# about 100.
 ROUNDING = 5e-5
 
 
 def isotropic(material: Any) -> Any:
-    """The material with what its model names set so that the tangents do not matter."""
+    """Returns the material with the parameters of `isotropic_where` set so that the tangents do not matter."""
     wanted = type(material).isotropic_where.items()
     return material.model_copy(update={name: getattr(material, x) if isinstance(x, str) else x for name, x in wanted})
 
@@ -60,14 +63,14 @@ def test_equal_widths_are_isotropic(name: str, on: Any, renderer: Renderer, data
 
 @pytest.mark.parametrize("on", STAGES)
 @pytest.mark.parametrize("name", ANISOTROPIC)
-def test_others_do(name: str, on: Any, renderer: Renderer) -> None:
+def test_unequal_widths_are_anisotropic(name: str, on: Any, renderer: Renderer) -> None:
     brushed = [material for material in at_extremes(name, 24) if material != isotropic(material)]
     assert max(change(material, math.pi / 3, on, renderer) for material in brushed) > 0.1
 
 
 @pytest.mark.parametrize("name", ANISOTROPIC)
 def test_half_a_turn_changes_nothing(name: str) -> None:
-    """The surface has no arrow on it. Exact: a half turn is a change of signs."""
+    """Tangents have no sign. The values are equal exactly, because half a turn only changes signs."""
     l, v = directions(256, 1), directions(256, 2)
     half = np.float32([-1, -1, 1])
     for material in at_extremes(name, 24):

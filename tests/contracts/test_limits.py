@@ -1,4 +1,4 @@
-"""Law: where a model says that it becomes another, it has that one's values, in all three places where it is evaluated."""
+"""Property: where a model declares that it equals another (`limits`), both have the same values in Python and both stages."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from extremes import FACTOR, ORDINARY, exact, joined, measured, pairs
+from support.extremes import FACTOR, ORDINARY, exact, joined, measured, pairs
 
 from glshade import BRDFS, Renderer
 
@@ -21,7 +21,7 @@ def test_is_reached(name: str, limit: Any, renderer: Renderer) -> None:
     assert one.max() > 0
     difference = np.abs(one - other)
     assert np.all(difference <= limit.within * np.maximum(np.abs(one), np.abs(other)) + 1e-30), limit.says
-    # On the GPU both are as exact as their model, whichever is asked.
+    # On the GPU each of the two is as exact as its own model.
     enough = FACTOR * uncertain + (ORDINARY + limit.within) * np.maximum(1, np.abs(one)) + difference
     for stage in ("vertex", "fragment"):
         gpu = [measured(material, stage, renderer, l, v) for material in (limit.one, limit.other)]  # type: ignore[arg-type]

@@ -1,11 +1,11 @@
-"""A third opinion: the models that Mitsuba 3 has too, against its values, to the precision of its floats."""
+"""Models that Mitsuba 3 has too agree with its values to the precision of its float32."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from extremes import unit, upward
 from numpy.typing import NDArray
+from support.extremes import unit, upward
 
 from glshade import evaluate
 from glshade.brdfs import BRDFS
@@ -20,13 +20,13 @@ try:
 except Exception as error:  # without /proc its import ends in a NameError
     pytest.skip(f"Mitsuba (in the dev extra where it has wheels) cannot be used here: {error!r}", allow_module_level=True)
 
-# Half an ulp of float32 for each of its few operations.
+# The error of Mitsuba's few operations in float32, half an ulp each.
 FLOAT = 4e-7
 UP = np.array([0.0, 0.0, 1.0])
 
 
 def test_lambert_is_its_diffuse() -> None:
-    """Mitsuba's eval has the cosine in it, as f cos has; below either horizon both are 0."""
+    """Mitsuba's eval includes the cosine, as f cos does. Both are 0 if l or v is below the horizon."""
     kd = (0.8, 0.3, 0.05)
     diffuse = mitsuba.load_dict({"type": "diffuse", "reflectance": {"type": "rgb", "value": list(kd)}})
     random = np.random.default_rng(3)
@@ -42,7 +42,7 @@ def test_lambert_is_its_diffuse() -> None:
 
 
 def pairs(count: int, seed: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """l, v (count, 3), above the horizon; half of the viewers near the mirror direction."""
+    """Returns l, v (count, 3) above the horizon; half of the viewers near the mirror direction."""
     l, v = upward(count, seed), upward(count, seed + 1)
     half = count // 2
     v[:half] = l[:half] * [-1, -1, 1] + np.random.default_rng(seed).normal(scale=0.1, size=(half, 3))
@@ -68,8 +68,11 @@ LOBES = [("GGX", "metal", 0.0), ("GGX", "metal", 0.7), ("Beckmann", "beckmann", 
 @pytest.mark.parametrize("roughness", [0.2, 0.5, 1.0])
 @pytest.mark.parametrize(("kind", "name", "anisotropy"), LOBES)
 def test_rough_conductor(kind: str, name: str, anisotropy: float, roughness: float) -> None:
-    """Mitsuba shadows l and v each by itself, G1(l) G1(v); ours are height-correlated, 1/(1/G1(l) + 1/G1(v) - 1). So its value
-    is taken with its own G1 put together as ours. Its G1 of Beckmann is a fit, and twice it errs by 6e-3."""
+    """Mitsuba's shadowing is separable, G1(l) G1(v); ours is height-correlated, 1/(1/G1(l) + 1/G1(v) - 1).
+
+    So the test divides Mitsuba's value by its shadowing, and multiplies it by the height-correlated form of Mitsuba's own G1.
+    Its G1 for Beckmann is a fit: two of them have an error of 6e-3.
+    """
     r = np.array(roughness)
     ax, ay = (float(a) for a in alphas(r, anisotropy))
     eta, k = (0.143, 0.375, 1.442), (3.983, 2.386, 1.603)
@@ -90,7 +93,7 @@ def test_rough_conductor(kind: str, name: str, anisotropy: float, roughness: flo
         m = mitsuba.Vector3f(middle.tolist())
         one, other = (microfacets.smith_g1(mitsuba.Vector3f(d.tolist()), m) for d in (light, viewer))
         expected.append(whole / (one * other) / (1 / one + 1 / other - 1))
-        # D by itself.
+        # The distribution D is also compared by itself.
         d = 4 * ggx_cos(UP, UP, middle, r, anisotropy) if kind == "GGX" else d_beckmann(middle, alpha(r))
         assert microfacets.eval(m) == pytest.approx(d, rel=3e-5, abs=1e-6)
     peak = np.max(expected)

@@ -1,4 +1,4 @@
-"""Law: the GLSL struct of a model repeats the parameters of its Python class, in name, order and kind."""
+"""Property: the GLSL struct of a model repeats the parameters of its Python class: the names, their order and their types."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import re
 import pytest
 
 from glshade import BRDFS
-from glshade.glsl import generator as source
+from glshade.glsl.shaders import SHIPPED
 
 
 def struct_fields(file: str, struct: str) -> list[tuple[str, str]]:
-    """(kind, name) of each field of a struct in a shader file."""
-    text = (source.SHADERS / file).read_text(encoding="utf-8")
+    """Returns (kind, name) of each field of a struct in a shader file."""
+    text = (SHIPPED / file).read_text(encoding="utf-8")
     found = re.search(rf"struct {struct} \{{(.*?)\}};", text, re.S)
     assert found, f"{file} has no struct {struct}"
     return re.findall(r"^\s*(\w+) (\w+);", found[1], re.M)

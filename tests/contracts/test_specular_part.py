@@ -1,4 +1,4 @@
-"""Law: a model's specular part is a part of it, and what is left, its diffuse lobes, has no highlight."""
+"""Property: a model's specular part is nowhere larger than the model. The rest, its diffuse lobes, has no highlight."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from extremes import FACTOR, ORDINARY, exact
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import directions, materials
+from support.extremes import FACTOR, ORDINARY, exact
+from support.strategies import directions, materials
 
 from glshade import BRDFS, Renderer, evaluate
 
-# Away from grazing light and views, where diffuse lobes too have their slopes, f of one that is called diffuse is nowhere more
-# than this times its median. The steepest is burley of roughness 1; a lobe of exponent 32 falls by 1e9.
+# The largest f of a diffuse part relative to its median, away from grazing directions, where diffuse lobes are steep too. The
+# steepest diffuse lobe is burley's at roughness 1; a specular lobe of exponent 32 falls by 1e9.
 EVEN = 8.0
-# f [1/sr] that counts as nothing: sheen alone has its slopes below it.
+# A smaller median counts as this value [1/sr], because sheen is steep only where it is faint.
 FAINT = 0.1
 
 
@@ -37,7 +37,7 @@ def test_the_rest_is_neither_negative_nor_narrow(name: str, data: Any, seed: int
         of_view = np.broadcast_to(view, high.shape)
         lit = evaluate(material, high, of_view)
         lit = lit if part is None else lit - evaluate(part, high, of_view)
-        # What a difference of near numbers has lost is not looked at.
+        # Differences of nearly equal numbers have no correct digits left, and count as 0.
         f = np.where(lit > 1e-9 * evaluate(material, high, of_view), lit, 0.0) / high[:, 2:]
         assert np.all(f.max(axis=0) <= EVEN * np.maximum(np.median(f, axis=0), FAINT)), (
             "a highlight is left in the diffuse part"
@@ -63,7 +63,7 @@ def test_gpu_has_the_part_of_the_reference(name: str, renderer: Renderer, data: 
 
 
 def test_known_parts() -> None:
-    """What is diffuse of some models, by their formulas and not by their code."""
+    """The diffuse parts of some models, from their formulas and not from their code."""
     l, v = np.array([0.6, 0.0, 0.8]), np.array([0.0, 0.6, 0.8])
     kd = np.array([0.75, 0.5, 0.25])
 

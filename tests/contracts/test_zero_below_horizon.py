@@ -1,4 +1,4 @@
-"""Law: f cos is exactly 0 where the light or the viewer is below the horizon, and in it: nothing leaks through."""
+"""Property: f cos is exactly 0 where the light or the viewer is in the horizon or below it, so that no light leaks through."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from strategies import directions, materials
+from support.strategies import directions, materials
 
 from glshade import BRDFS, Renderer, evaluate
 

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import strategies
 from hypothesis import HealthCheck, given, settings
+from support import strategies
 
 import glshade
-from glshade.scene.scene import Rate
+from glshade.scene.object import Rate
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = sorted((ROOT / "scenes").glob("*.toml"))

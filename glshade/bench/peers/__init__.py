@@ -1,13 +1,13 @@
-"""Peers: other programs that draw the same work. A module here is a peer, named as the library that it needs.
+"""Peers: programs other than glshade that draw the same works. Each module is one peer, named after the library that it needs.
 
-Each has `class Peer`:
+Each module has a `class Peer`:
 
-    __init__(stage)   opens, uploads and, where there is a choice, takes what is fastest at that picture
-    frame(eye)        (H, W, 3 or 4) uint8, row 0 at the top
-    save(eye, path)   the frame to a PNG file, as people who use the library write one
-    driver            what draws
+    __init__(stage)   opens the driver and uploads the scene, with the settings that draw this picture fastest
+    frame(eye)        returns the picture (H, W, 3 or 4) uint8, row 0 at the top
+    save(eye, path)   writes the picture to a PNG file, in the way that is usual for the library
+    driver            name of the driver
 
-They share nothing with glshade but the numbers of the scene.
+Peers share no code with glshade except the numbers of the scene.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from glshade.bench.works import BY_HAND
 NAMES = tuple(sorted(path.stem for path in Path(__file__).parent.glob("*.py") if not path.stem.startswith("_")))
 
 
-class Program(Protocol):
-    """What draws a stage."""
+class PeerProgram(Protocol):
+    """A program that draws a stage."""
 
     driver: str
 
     def frame(self, eye: tuple[float, float, float]) -> NDArray[Any]:
-        """(H, W, 3 or 4) uint8, row 0 at the top."""
+        """Returns the picture (H, W, 3 or 4) uint8, row 0 at the top, seen from `eye` towards the origin."""
 
     def save(self, eye: tuple[float, float, float], path: str) -> None:
-        """The frame, as a PNG file."""
+        """Writes the picture to a PNG file."""
 
 
 def installed() -> tuple[str, ...]:
-    """The peers whose libraries are there, the one written by hand first. None is imported."""
-    found = [name for name in NAMES if importlib.util.find_spec(name) is not None]
-    return tuple(sorted(found, key=lambda name: (name != BY_HAND, name)))
+    """Returns the names of the peers whose libraries are installed, BY_HAND first. No library is imported."""
+    names = [name for name in NAMES if importlib.util.find_spec(name) is not None]
+    return tuple(sorted(names, key=lambda name: (name != BY_HAND, name)))

@@ -1,5 +1,6 @@
-"""GLSL that somebody would write for just this picture."""
+"""GLSL: fragment shaders that are written for just the picture of the works. Two peers share them."""
 
+# Kind of lights -> fragment shader. The constants are those of glshade.bench.stage.
 FRAGMENT = {
     "directional": """\
 #version 330

@@ -1,4 +1,4 @@
-"""Mitsuba: rays, one a pixel, compiled by LLVM; its rough plastic."""
+"""Mitsuba: a peer that traces one ray a pixel, compiled by LLVM, with its model of rough plastic."""
 
 from __future__ import annotations
 
@@ -8,20 +8,20 @@ import mitsuba as mi
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.bench.stage import COLOURS, EYE, FAR, FOV, KD, NEAR, POSITIONS, TO_LIGHT, Stage
+from glshade.bench.stage import COLOURS, EYE, FAR, FOV, KD, NEAR, POSITIONS, TO_LIGHT, WorkFiles
 
 VARIANT = "llvm_ad_rgb"
 mi.set_variant(VARIANT)
 
 
 class Peer:
-    """The integrator of direct light, a box filter, one sample."""
+    """Mitsuba's integrator of direct light, with a box filter and one sample a pixel."""
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: WorkFiles) -> None:
         self.driver = f"Mitsuba {mi.__version__} {VARIANT}"
         positions, triangles = stage.arrays()
         properties = mi.Properties()
-        # As wide as an exponent of 32: alpha = sqrt(2 / (n + 2)).
+        # This alpha gives a lobe as wide as that of a Phong exponent n of 32: alpha = sqrt(2 / (n + 2)).
         plastic = {"type": "roughplastic", "diffuse_reflectance": {"type": "rgb", "value": list(KD)}, "alpha": 0.24}
         properties["material"] = mi.load_dict(plastic)
         mesh = mi.Mesh("sphere", len(positions), len(triangles), has_vertex_normals=True, props=properties)
@@ -72,7 +72,7 @@ def _lights(kind: str) -> dict[str, Any]:
         light = {"type": "directional", "direction": [-x for x in TO_LIGHT], "irradiance": {"type": "rgb", "value": np.pi}}
         return {"light": light}
     return {
-        # It falls off with the square of the distance, about 3.
+        # Mitsuba's light falls off with the square of the distance. The distance is about 3, so a factor of 9 makes up for it.
         f"light{i}": {"type": "point", "position": p, "intensity": {"type": "rgb", "value": c}}
         for i, (p, c) in enumerate(zip(POSITIONS.tolist(), (COLOURS * 9 * np.pi).tolist(), strict=True))
     }

@@ -1,4 +1,4 @@
-"""moderngl by hand: the program that somebody writes who knows the driver and wants just this picture."""
+"""moderngl: a peer that uses nothing but moderngl, written as an expert would write it for just this picture."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.bench.peers._glsl import FRAGMENT
-from glshade.bench.stage import COLOURS, POSITIONS, TO_LIGHT, Stage, look_at, perspective
+from glshade.bench.stage import COLOURS, POSITIONS, TO_LIGHT, WorkFiles, look_at, perspective
 
 VERTEX = """\
 #version 330
@@ -22,29 +22,29 @@ void main() {
     gl_Position = clip_from_world * vec4(position, 1.0);
 }
 """
-# By its versioned name, which machines without development packages have.
+# The versioned name of the library; machines without development packages lack the unversioned one.
 LIBEGL = "libEGL.so.1"
 
 
 class Peer:
-    """Indexed triangles, back faces culled, nothing that changes but the camera, pixels into an array that is there already."""
+    """Draws indexed triangles with back faces culled, changes only the camera, and reads pixels into an existing array."""
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: WorkFiles) -> None:
         gl = moderngl.create_context(standalone=True, backend="egl", libegl=LIBEGL, libgl=LIBEGL)  # type: ignore[arg-type]
         self.driver = f"{gl.info['GL_RENDERER']}; {gl.info['GL_VERSION']}"
         size = (stage.side, stage.side)
         self._target = gl.simple_framebuffer(size)
         self._target.use()
         gl.enable_only(moderngl.DEPTH_TEST | moderngl.CULL_FACE)
-        # Drawn upside down, so that row 0 is the top: counter-clockwise becomes clockwise.
+        # The picture is drawn upside down, so that row 0 is the top. This makes counter-clockwise triangles clockwise.
         gl.front_face = "cw"
         self._flipped = np.diag([1.0, -1.0, 1.0, 1.0]) @ perspective()
         positions, triangles = stage.arrays()
         program = gl.program(VERTEX, FRAGMENT[stage.lights])
-        # Of a sphere about the origin the position is the normal.
+        # A unit sphere around the origin needs no array of normals: each normal equals the vertex position.
         self._mesh = gl.vertex_array(program, [(gl.buffer(positions), "3f", "position")], gl.buffer(triangles))
-        given: dict[str, Any] = {"to_light": TO_LIGHT, "positions": POSITIONS, "colours": COLOURS}
-        for name, value in given.items():
+        uniforms: dict[str, Any] = {"to_light": TO_LIGHT, "positions": POSITIONS, "colours": COLOURS}
+        for name, value in uniforms.items():
             if name in program:
                 program[name].write(np.asarray(value, dtype="f4"))  # type: ignore[union-attr]
         self._program = program

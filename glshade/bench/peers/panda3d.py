@@ -1,4 +1,7 @@
-"""Panda3D, headless, with the same GLSL as the program by hand: its own shading lights each vertex, or is slower."""
+"""Panda3D: a peer without a window, which uses the GLSL of the peer moderngl.
+
+Panda3D's own shading would either evaluate light only at each vertex, or be slower.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,7 @@ from numpy.typing import NDArray
 from panda3d import core
 
 from glshade.bench.peers._glsl import FRAGMENT
-from glshade.bench.stage import COLOURS, EYE, FAR, FOV, NEAR, POSITIONS, TO_LIGHT, Stage
+from glshade.bench.stage import COLOURS, EYE, FAR, FOV, NEAR, POSITIONS, TO_LIGHT, WorkFiles
 
 SETTINGS = """\
 load-display p3headlessgl
@@ -34,23 +37,23 @@ void main() {
 
 
 class Peer:
-    """A buffer whose texture is copied to memory after each frame."""
+    """An offscreen buffer whose texture is copied to memory after each frame."""
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: WorkFiles) -> None:
         core.load_prc_file_data("", SETTINGS)
         self._engine = core.GraphicsEngine.get_global_ptr()
         pipe = core.GraphicsPipeSelection.get_global_ptr().make_default_pipe()
-        wanted = core.FrameBufferProperties()
-        wanted.set_rgba_bits(8, 8, 8, 8)
-        wanted.set_depth_bits(24)
+        format = core.FrameBufferProperties()
+        format.set_rgba_bits(8, 8, 8, 8)
+        format.set_depth_bits(24)
         size = core.WindowProperties.size(stage.side, stage.side)
-        target = self._engine.make_output(pipe, "picture", 0, wanted, size, core.GraphicsPipe.BF_refuse_window)
+        target = self._engine.make_output(pipe, "picture", 0, format, size, core.GraphicsPipe.BF_refuse_window)
         if target is None:
             raise RuntimeError("Panda3D gives no offscreen buffer")
         self._texture, self._side = core.Texture(), stage.side
         target.add_render_texture(self._texture, core.GraphicsOutput.RTM_copy_ram)
         target.set_clear_color((0, 0, 0, 1))
-        # Nothing but the scene refers to its parts; a scene that is forgotten takes them along.
+        # Keep the root alive: Panda3D frees the nodes below it together with it.
         self._root = core.NodePath("root")
         self._sphere = self._root.attach_new_node(_geometry(*stage.arrays()))
         self._sphere.set_shader(core.Shader.make(core.Shader.SL_GLSL, VERTEX, FRAGMENT[stage.lights]))
@@ -62,7 +65,7 @@ class Peer:
         lens.set_near_far(NEAR, FAR)
         self._camera = self._root.attach_new_node(core.Camera("camera", lens))
         target.make_display_region().set_camera(self._camera)
-        # The buffer is made in the first frame and drawn in the second.
+        # Panda3D creates the buffer in the first frame and draws into it from the second on.
         for _ in range(2):
             self._render(EYE)
         gsg = target.get_gsg()

@@ -1,4 +1,4 @@
-"""pyrender: its own shading of a glossy dielectric, and its four samples a pixel, which cannot be turned off."""
+"""pyrender: a peer with its own model of a glossy dielectric, and four samples a pixel, which cannot be turned off."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ import pyrender
 import pyrender.renderer
 from OpenGL.GL import GL_RENDERER, GL_VERSION, glGetString
 
-from glshade.bench.stage import AMBIENT, COLOURS, EYE, FAR, FOV, KD, LAMPS, NEAR, POSITIONS, TO_LIGHT, Stage, look_at
+from glshade.bench.stage import AMBIENT, COLOURS, EYE, FAR, FOV, KD, LAMPS, NEAR, POSITIONS, TO_LIGHT, WorkFiles, look_at
 
-# It draws four lights of a kind unless told otherwise.
+# By default pyrender draws no more than four lights of each kind.
 pyrender.renderer.MAX_N_LIGHTS = LAMPS
 
 
 class Peer:
-    """OffscreenRenderer."""
+    """Draws with pyrender's OffscreenRenderer."""
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: WorkFiles) -> None:
         positions, triangles = stage.arrays()
-        # As glossy as an exponent of 32: alpha = sqrt(2 / (n + 2)), roughness = sqrt(alpha).
+        # This roughness is as glossy as a Phong exponent n of 32: alpha = sqrt(2 / (n + 2)), roughness = sqrt(alpha).
         material = pyrender.MetallicRoughnessMaterial(baseColorFactor=(*KD, 1.0), metallicFactor=0.0, roughnessFactor=0.5)
         sphere = pyrender.Primitive(positions=positions, normals=positions, indices=triangles, material=material, mode=4)
         self._scene = pyrender.Scene(bg_color=(0.0, 0.0, 0.0, 0.0), ambient_light=(AMBIENT,) * 3)
@@ -33,14 +33,15 @@ class Peer:
         camera = pyrender.PerspectiveCamera(np.radians(FOV), znear=NEAR, zfar=FAR)
         self._camera = self._scene.add(camera, pose=np.linalg.inv(look_at(EYE)))
         if stage.lights == "directional":
-            # E lux are E / pi of glshade's intensity.
+            # An illuminance of E lux corresponds to an intensity of E / pi in glshade.
             sun = pyrender.DirectionalLight(color=np.ones(3), intensity=np.pi)
             self._scene.add(sun, pose=np.linalg.inv(look_at(TO_LIGHT)))
         else:
             for position, colour in zip(POSITIONS, COLOURS, strict=True):
                 pose = np.eye(4)
                 pose[:3, 3] = position
-                # It falls off with the square of the distance, about 3.
+                # pyrender's light falls off with the square of the distance. The distance is about 3, so a factor of 9 makes up
+                # for it.
                 self._scene.add(pyrender.PointLight(color=colour, intensity=9 * np.pi), pose=pose)
         self._renderer = pyrender.OffscreenRenderer(stage.side, stage.side)
         self._renderer._platform.make_current()

@@ -1,4 +1,4 @@
-"""VTK, without PyVista round it: its Phong shading gives the same picture."""
+"""VTK: a peer that uses VTK directly, without PyVista; its Phong shading draws the same picture."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-# Windows without a screen; of its several kinds the one that uses the driver of the others.
+# Selects offscreen windows by EGL, so that VTK uses the same driver as the other programs.
 os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 
 import vtk
 from vtk.util import numpy_support
 
-from glshade.bench.stage import AMBIENT, COLOURS, EXPONENT, EYE, FAR, FOV, KD, KS, NEAR, POSITIONS, TO_LIGHT, Stage
+from glshade.bench.stage import AMBIENT, COLOURS, EXPONENT, EYE, FAR, FOV, KD, KS, NEAR, POSITIONS, TO_LIGHT, WorkFiles
 
 
 class Peer:
-    """vtkRenderWindow, back faces culled, no multisampling."""
+    """Draws with a vtkRenderWindow, with back faces culled and without multisampling."""
 
-    def __init__(self, stage: Stage) -> None:
+    def __init__(self, stage: WorkFiles) -> None:
         window, renderer = vtk.vtkRenderWindow(), vtk.vtkRenderer()
         renderer.AddActor(self._sphere(stage))
         renderer.SetBackground(0, 0, 0)
@@ -41,15 +41,17 @@ class Peer:
         self._window, self._renderer, self._side = window, renderer, stage.side
         self._pixels = vtk.vtkUnsignedCharArray()
         window.Render()
-        said = dict(line.split(" string:") for line in window.ReportCapabilities().splitlines() if " string:" in line)
-        self.driver = "; ".join(said[f"OpenGL {key}"].strip() for key in ("renderer", "version"))
+        capabilities = dict(line.split(" string:") for line in window.ReportCapabilities().splitlines() if " string:" in line)
+        self.driver = "; ".join(capabilities[f"OpenGL {key}"].strip() for key in ("renderer", "version"))
 
-    def _sphere(self, stage: Stage) -> Any:
-        # VTK refers to NumPy's arrays and does not keep them.
-        self._kept = positions, _ = stage.arrays()[0], stage.arrays()[1].astype(np.int64)
+    def _sphere(self, stage: WorkFiles) -> Any:
+        # VTK refers to the memory of NumPy's arrays without holding a reference, so the arrays must be kept here.
+        positions, triangles = stage.arrays()
+        indices = triangles.astype(np.int64)
+        self._kept = positions, indices
         points, cells, data = vtk.vtkPoints(), vtk.vtkCellArray(), vtk.vtkPolyData()
         points.SetData(numpy_support.numpy_to_vtk(positions))
-        cells.SetData(3, numpy_support.numpy_to_vtkIdTypeArray(self._kept[1].ravel()))
+        cells.SetData(3, numpy_support.numpy_to_vtkIdTypeArray(indices.ravel()))
         normals = numpy_support.numpy_to_vtk(positions)
         data.SetPoints(points)
         data.SetPolys(cells)

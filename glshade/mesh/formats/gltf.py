@@ -1,36 +1,36 @@
-"""glTF: glTF 2 with its scene's nodes, as .gltf with buffers beside it or as one .glb."""
+"""glTF: the JSON form of glTF 2, with its buffers in other files or in data URIs. The nodes of its scene become parts."""
 
 from __future__ import annotations
 
-import base64
 import json
-import struct
 from collections.abc import Iterator
 from typing import Any
-from urllib.parse import unquote
 
 import numpy as np
 
-from glshade.mesh.formats import gltf_material
-from glshade.mesh.formats.colours import with_alpha
-from glshade.mesh.formats.contents import Material
-from glshade.mesh.formats.file import File
-from glshade.mesh.formats.parser import parse
-from glshade.mesh.mesh import Float64, Mesh
+from glshade.arrays import Float64
+from glshade.mesh.mesh import Mesh
+from glshade.mesh.reading import gltf_material
+from glshade.mesh.reading.colours import with_alpha
+from glshade.mesh.reading.contents import Material
+from glshade.mesh.reading.file import MeshFile
+from glshade.mesh.reading.gltf_container import opened
+from glshade.mesh.reading.parser import parse
 
 _TRIANGLES, _STRIP = 4, 5
 _COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
 
 
-def read(file: File) -> None:
-    header, buffers = _header(file)
+def read(file: MeshFile) -> None:
+    """Adds a part for each primitive of each node of a glTF scene; nodes with one mesh share it. Errors: AssetError."""
+    header, buffers = opened(file)
     for extension in header.get("extensionsRequired", ()):
         if extension in _COMPRESSED:
             raise file.fail(f"needs the glTF extension {extension}, which is not supported; save it uncompressed")
     accessors = header.get("accessors", [])
 
-    # Only triangles are handed to trimesh, under names by which what it returns can be told apart; its scene graph
-    # loses the children of cameras, so nodes are walked here. Attributes that start with _ come back as they are.
+    # trimesh gets the primitives that consist of triangles, in meshes whose names are their numbers. Attributes whose names
+    # start with "_" come back unchanged. Nodes are not given to trimesh, because its scene graph loses the children of cameras.
     kept: list[tuple[int, dict[str, Any]]] = []
     others = 0
     meshes = []
@@ -68,7 +68,7 @@ def read(file: File) -> None:
     assert len(geometries) == len(kept)
 
     def values(raw: Any, accessor: int) -> Float64:
-        """As floats; integers marked as normalized are fractions of their range (glTF 2.0, 3.6.2.2)."""
+        """Returns an accessor's values as float64. Integers marked as normalized are fractions (glTF 2.0, 3.6.2.2)."""
         raw = np.asarray(raw)
         if raw.dtype.kind == "f" or not accessors[accessor].get("normalized", False):
             return np.array(raw, dtype=np.float64)
@@ -83,9 +83,9 @@ def read(file: File) -> None:
         uvs = colours = normals = None
         if "_UV" in attributes:
             uvs = values(extra["_UV"], attributes["_UV"])
-            uvs[:, 1] = 1 - uvs[:, 1]  # glTF has v = 0 at the top of the picture
+            uvs[:, 1] = 1 - uvs[:, 1]  # in glTF v = 0 is the top of the picture
         if "_COLOUR" in attributes:
-            colours = with_alpha(values(extra["_COLOUR"], attributes["_COLOUR"]))  # linear already (glTF 2.0, 3.7.2.1)
+            colours = with_alpha(values(extra["_COLOUR"], attributes["_COLOUR"]))  # they are linear (glTF 2.0, 3.7.2.1)
         if "NORMAL" in attributes:
             normals = values(geometry["vertex_normals"], attributes["NORMAL"])
         positions = values(geometry["vertices"], attributes["POSITION"])
@@ -110,59 +110,11 @@ def read(file: File) -> None:
             stored.setdefault(id(mesh), len(file.contents.meshes) - 1)
 
 
-def _header(file: File) -> tuple[dict[str, Any], list[bytes]]:
-    """The JSON part, checked for its version, and the bytes of every buffer."""
-    data, binary = file.data, None
-    if data[:4] == b"glTF":
-        version, length = struct.unpack_from("<II", data, 4)
-        if version != 2:
-            raise file.fail(f"is glTF {version}; only glTF 2 is supported")
-        if length > len(data):
-            raise file.fail(f"is truncated: {len(data)} bytes of {length}")
-        chunks: dict[bytes, bytes] = {}
-        offset = 12
-        while offset + 8 <= length:
-            size, kind = struct.unpack_from("<I4s", data, offset)
-            chunks.setdefault(kind, data[offset + 8 : offset + 8 + size])
-            offset += 8 + size
-        if b"JSON" not in chunks:
-            raise file.fail("is not a GLB file: it has no JSON chunk")
-        data, binary = chunks[b"JSON"], chunks.get(b"BIN\0")
-    elif file.path.suffix.lower() == ".glb":
-        raise file.fail("is not a GLB file: it does not start with 'glTF'")
-    try:
-        header = json.loads(data.decode("utf-8-sig"))
-    except ValueError as error:
-        raise file.fail(f"is not glTF: its JSON cannot be read: {error}") from None
-    if not isinstance(header, dict) or "asset" not in header:
-        raise file.fail("is not glTF: it has no 'asset'")
-    version = str(header["asset"].get("version", "2.0"))
-    if not version.startswith("2"):
-        raise file.fail(f"is glTF {version}; only glTF 2 is supported")
-    buffers = []
-    for index, buffer in enumerate(header.get("buffers", [])):
-        if "uri" in buffer:
-            found = _uri(file, buffer["uri"])
-            if found is None:
-                raise file.fail(f"its buffer '{unquote(buffer['uri'])}' is missing")
-        elif index == 0 and binary is not None:
-            found = binary
-        else:
-            raise file.fail(f"buffer {index} has no data")
-        if len(found) < buffer["byteLength"]:
-            raise file.fail(f"buffer {index} is truncated: {len(found)} bytes of {buffer['byteLength']}")
-        buffers.append(found)
-    return header, buffers
+def _nodes(file: MeshFile, header: dict[str, Any]) -> Iterator[tuple[str | None, int, Float64]]:
+    """Yields (name, number of the mesh, transform (4, 4) to file space) for every node with a mesh in the scene of the file.
 
-
-def _uri(file: File, uri: str) -> bytes | None:
-    if uri.startswith("data:"):
-        return base64.b64decode(uri.partition(",")[2])
-    return file.read(file.beside(unquote(uri)))
-
-
-def _nodes(file: File, header: dict[str, Any]) -> Iterator[tuple[str | None, int, Float64]]:
-    """Name, mesh and transform to the file's space of every node with a mesh in the file's scene."""
+    Errors: AssetError.
+    """
     nodes = header.get("nodes", [])
     scenes = header.get("scenes", [])
     children = {child for node in nodes for child in node.get("children", [])}
@@ -174,7 +126,8 @@ def _nodes(file: File, header: dict[str, Any]) -> Iterator[tuple[str | None, int
             raise file.fail("its nodes form a cycle")
     if not nodes:
         yield from ((None, number, np.eye(4)) for number in range(len(header.get("meshes", []))))
-    # Depth first, in the file's order, without recursion: a chain of nodes may be longer than Python's stack.
+    # The nodes are visited depth first in the order of the file, and without recursion, because a chain of nodes may be longer
+    # than Python's stack is deep.
     waiting: list[tuple[int, Float64, tuple[int, ...]]] = [(root, np.eye(4), ()) for root in reversed(roots)]
     seen: set[int] = set()
     while waiting:
@@ -197,9 +150,9 @@ def _nodes(file: File, header: dict[str, Any]) -> Iterator[tuple[str | None, int
 
 
 def _transform(node: dict[str, Any]) -> Float64:
-    """(4, 4) to the parent's space: the node's matrix, or T R S."""
+    """Returns the transform (4, 4) from a node to its parent: its matrix, or its translation, rotation and scale."""
     if "matrix" in node:
-        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T  # stored column by column
+        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T  # glTF stores it column by column
     result = np.eye(4)
     x, y, z, w = np.array(node.get("rotation", (0.0, 0.0, 0.0, 1.0)), dtype=np.float64)
     norm = x * x + y * y + z * z + w * w

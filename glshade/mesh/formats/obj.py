@@ -1,4 +1,7 @@
-"""OBJ: the Wavefront format, read line by line and handed to trimesh in its strictest form."""
+"""OBJ: the Wavefront format with its MTL files.
+
+The text is rewritten line by line in a strict form, which trimesh then parses.
+"""
 
 from __future__ import annotations
 
@@ -8,27 +11,33 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from glshade.mesh.formats import mtl
-from glshade.mesh.formats.colours import srgb_to_linear, with_alpha
-from glshade.mesh.formats.contents import Material
-from glshade.mesh.formats.file import File, text_of
-from glshade.mesh.formats.parser import parse, triangles
-from glshade.mesh.formats.polygon import triangulated
-from glshade.mesh.mesh import Float64
+from glshade.arrays import Float64
+from glshade.mesh.reading import mtl
+from glshade.mesh.reading.colours import srgb_to_linear, with_alpha
+from glshade.mesh.reading.contents import Material
+from glshade.mesh.reading.file import MeshFile, text_of
+from glshade.mesh.reading.parser import parse, triangles
+from glshade.mesh.reading.polygon import triangulated
 
 
 @dataclass
 class _Faces:
-    """Faces of one object, one material and one form of corner (v, v/vt, v//vn or v/vt/vn)."""
+    """The triangles with one object name, one material and one form of corner (v, v/vt, v//vn or v/vt/vn).
+
+    lines: the corners of each triangle, as text.
+    numbers: the number of the line in the file from which each triangle comes, for messages.
+    """
 
     lines: list[str] = field(default_factory=list)
-    numbers: list[int] = field(default_factory=list)  # of the line in the file, for messages
+    numbers: list[int] = field(default_factory=list)
 
 
+# The number of "/" and the number of "//" in three corners -> the form of the corners.
 _FORMS = {(0, 0): "v", (3, 0): "v/vt", (6, 3): "v//vn", (6, 0): "v/vt/vn"}
 
 
-def read(file: File) -> None:
+def read(file: MeshFile) -> None:
+    """Adds a part for each object, material and form of corner in an OBJ file. Errors: AssetError."""
     text = text_of(file.data).replace("\\\n", " ")
     attributes: dict[str, list[str]] = {"v": [], "vt": [], "vn": []}
     groups: dict[tuple[str, str | None, str], _Faces] = {}
@@ -55,8 +64,8 @@ def read(file: File) -> None:
         raise file.fail("holds only points, no triangles")
     groups = _in_range(file, attributes, groups)
 
-    # trimesh reads the text in its strictest form: triangles, absolute indices, one form of corner in each object. Its
-    # parser counts negative indices from the end of the file and takes the form of all faces from the first.
+    # trimesh gets triangles, absolute indices, and one form of corner in each object, because its parser counts negative
+    # indices from the end of the file and assumes that all faces of an object have the form of the first.
     strict = [f"{key} {line}" for key, lines in attributes.items() for line in lines]
     for index, faces in enumerate(groups.values()):
         strict.append(f"o {index}")
@@ -75,7 +84,7 @@ def read(file: File) -> None:
         if geometry.get("vertex_colors") is not None:
             raw = np.asarray(geometry["vertex_colors"], dtype=np.float64)
             raw = raw / 255 if raw.max() > 1 else raw
-            colours = with_alpha(srgb_to_linear(raw))  # programs write their encoded bytes here, divided by 255
+            colours = with_alpha(srgb_to_linear(raw))  # programs write sRGB-encoded bytes here, or those divided by 255
         if material and materials and material not in materials:
             file.warn(f"material '{material}' is in no material file; drawn without it")
         mesh = file.build(
@@ -89,8 +98,15 @@ def read(file: File) -> None:
         file.contents.add(title, mesh, materials.get(material) if material else None)
 
 
-def _corners(file: File, number: int, corners: str, attributes: dict[str, list[str]]) -> Iterator[tuple[str, str]]:
-    """The form and the corners of each triangle of a face line, indices counted from the file's start."""
+def _corners(file: MeshFile, number: int, corners: str, attributes: dict[str, list[str]]) -> Iterator[tuple[str, str]]:
+    """Yields the form and the corners of each triangle of a face, with indices counted from the start of the file.
+
+    number: the number of the line, for messages.
+    corners: the text of the line without its first word.
+    attributes: the lines "v", "vt" and "vn" that were read so far, by their first word.
+
+    Errors: AssetError.
+    """
     if corners.count(" ") == 2 and "-" not in corners and "/ " not in corners and corners[-1] != "/":
         form = _FORMS.get((corners.count("/"), corners.count("//")))
         if form is not None:
@@ -130,11 +146,11 @@ def _corners(file: File, number: int, corners: str, attributes: dict[str, list[s
 
 
 def _in_range(
-    file: File, attributes: dict[str, list[str]], groups: dict[tuple[str, str | None, str], _Faces]
+    file: MeshFile, attributes: dict[str, list[str]], groups: dict[tuple[str, str | None, str], _Faces]
 ) -> dict[tuple[str, str | None, str], _Faces]:
-    """The groups, with references to uvs and normals that the file lacks taken out (warned of).
+    """Returns the groups. References to uvs or normals that the file does not hold are removed, with a warning for the group.
 
-    Raises AssetError, with the line's number, for a vertex that the file lacks.
+    Errors: AssetError, with the number of the line, for a vertex that the file does not hold.
     """
     result: dict[tuple[str, str | None, str], _Faces] = {}
     for (name, material, form), faces in groups.items():
@@ -169,7 +185,8 @@ def _in_range(
     return result
 
 
-def _materials_of(file: File, libraries: list[str]) -> dict[str, Material]:
+def _materials_of(file: MeshFile, libraries: list[str]) -> dict[str, Material]:
+    """Returns the materials by name. libraries: the text of each "mtllib" line without its first word."""
     materials: dict[str, Material] = {}
     for line in libraries:
         # The whole line may be one name with spaces, or several names.

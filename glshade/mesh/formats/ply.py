@@ -1,4 +1,4 @@
-"""PLY: the Stanford polygon format, with colours and texture coordinates of vertices or of faces."""
+"""PLY: the Stanford polygon format, with colours of vertices, and texture coordinates of vertices or of faces."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from glshade.mesh.formats.colours import srgb_to_linear, with_alpha
-from glshade.mesh.formats.contents import Material
-from glshade.mesh.formats.file import File
-from glshade.mesh.formats.parser import parse, triangles
-from glshade.mesh.mesh import Float64
+from glshade.arrays import Float64
+from glshade.mesh.reading.colours import srgb_to_linear, with_alpha
+from glshade.mesh.reading.contents import Material
+from glshade.mesh.reading.file import MeshFile
+from glshade.mesh.reading.parser import parse, triangles
 
 
-def read(file: File) -> None:
-    # fix_texture would renumber the vertices but not their normals and colours.
+def read(file: MeshFile) -> None:
+    """Adds the mesh of a PLY file, with the texture that its comments name. Errors: AssetError."""
+    # fix_texture would renumber the vertices, but not their normals and colours.
     parsed = parse("ply", file.data, skip_materials=True, fix_texture=False)
     if "vertices" not in parsed:
         raise file.fail("holds no vertices")
@@ -27,7 +28,7 @@ def read(file: File) -> None:
         raw = np.asarray(parsed["vertex_colors"])
         colours = raw / np.iinfo(raw.dtype).max if raw.dtype.kind == "u" else raw.astype(np.float64)
         colours = with_alpha(colours)
-        if raw.dtype.itemsize == 1:  # bytes are sRGB-encoded by custom; wider types are taken as linear
+        if raw.dtype.itemsize == 1:  # bytes are sRGB-encoded by convention; wider types are taken as linear
             colours[:, :3] = srgb_to_linear(colours[:, :3])
     has = set(vertex.dtype.names if isinstance(vertex, np.ndarray) else vertex)
     uvs = None
@@ -55,7 +56,11 @@ def read(file: File) -> None:
 
 
 def _face_uvs(data: Any, shape: tuple[int, ...]) -> Float64 | None:
-    """(corners, 2) from a face property `texcoord`, in the two forms in which trimesh leaves it."""
+    """Returns the uvs (corners, 2) that a property `texcoord` gives to the corners of faces; None if there is none.
+
+    data: the elements "face" as trimesh leaves them, which is either a structured array or a table.
+    shape: the shape of the faces' indices.
+    """
     try:
         raw = data["texcoord"]
         if isinstance(data, np.ndarray):

@@ -1,9 +1,10 @@
-#include "lib/constants.glsl"
-#include "lib/frame.glsl"
+#include "math/constants.glsl"
+#include "surface/frame.glsl"
 #include "microfacet/microfacet_alpha.glsl"
 
-// GGX by the textbook, with c^2 (alpha^2 - 1) + 1 of the rounded cosine c: 6e-5 off at alpha 0.1, 79 % at 1e-3. Takes the
-// place of microfacet/ggx_isotropic.glsl where a scene asks for fast arithmetic.
+// GGX by the textbook formula. This file replaces microfacet/ggx_isotropic.glsl where a scene asks for fast arithmetic. It
+// computes c^2 (alpha^2 - 1) + 1 from the rounded cosine c: the relative error is 6e-5 at alpha = 0.1, and 79 % at
+// alpha = 1e-3.
 float ggx_cos(Frame f, vec3 l, vec3 v, vec3 h, float roughness, float anisotropy) {
     float a = microfacet_alpha(roughness);
     float a2 = a * a;

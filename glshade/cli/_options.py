@@ -1,0 +1,165 @@
+"""Options: command-line options that several commands share."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from glshade.scene.scene import Scene
+
+
+# Key of the film -> name of its option, for options whose name differs from the key.
+OPTIONS = {"aovs": "aov"}
+
+
+class Size(click.ParamType[tuple[int, int]]):
+    """An option's type: a size such as `640x480`, as (width, height) [pixels]."""
+
+    name = "WxH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int]:
+        if isinstance(value, tuple):
+            return value
+        match = re.fullmatch(r"(\d+)x(\d+)", value)
+        if not match or "0" in match.groups():
+            self.fail(f"{value!r} is not a size such as 640x480", param, ctx)
+        return int(match[1]), int(match[2])
+
+
+class Crop(click.ParamType[tuple[int, int, int, int]]):
+    """An option's type: a window such as `10,20,64x48`, as (x, y, width, height) from the top left [pixels]."""
+
+    name = "X,Y,WxH"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> tuple[int, int, int, int]:
+        if isinstance(value, tuple):
+            return value
+        match = re.fullmatch(r"(\d+),(\d+),(\d+)x(\d+)", value)
+        if not match:
+            self.fail(f"{value!r} is not a window such as 10,20,64x48", param, ctx)
+        x, y, width, height = map(int, match.groups())
+        return x, y, width, height
+
+
+class Duration(click.ParamType[float]):
+    """An option's type: a time such as `5ms` or `0.2s`, in seconds. A number without unit is in milliseconds."""
+
+    name = "TIME"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        if isinstance(value, float):
+            return value
+        match = re.fullmatch(r"([0-9.]+(?:e-?\d+)?)\s*(ms|s|)", value)
+        try:
+            seconds = float(match[1]) * (1.0 if match[2] == "s" else 1e-3) if match else 0.0
+        except ValueError:
+            seconds = 0.0
+        if not seconds > 0:
+            self.fail(f"{value!r} is not a time such as 5ms or 0.2s", param, ctx)
+        return seconds
+
+
+def driver(command: Any) -> Any:
+    """Adds the options --backend and --device, whose values Renderer takes as arguments of these names."""
+    command = click.option("--device", type=int, help="Index of the EGL device, as `glshade devices` lists them.")(command)
+    backends = click.Choice(["auto", "egl", "osmesa", "standalone"])
+    help = "OpenGL backend; auto is EGL on Linux, and OSMesa if EGL fails."
+    return click.option("--backend", type=backends, default="auto", show_default=True, help=help)(command)
+
+
+def shaders(command: Any) -> Any:
+    """Adds the option --shaders, whose value `shaders` holds the paths of the user's own shader folders."""
+    return click.option(
+        "--shaders",
+        multiple=True,
+        metavar="FOLDER",
+        callback=_check_shaders,
+        help="Folder of GLSL files that replace glshade's files of the same names, such as brdf/phong.glsl. Repeatable.",
+    )(command)
+
+
+def _check_shaders(ctx: click.Context, option: click.Parameter, folders: tuple[str, ...]) -> tuple[str, ...]:
+    """Reads the shader folders, so that a faulty one is reported once, before worker processes start. Returns the folders.
+
+    Errors: ShaderError.
+    """
+    if folders and not ctx.resilient_parsing:
+        from glshade.glsl.shaders import current
+
+        current(folders)
+    return folders
+
+
+def models(command: Any) -> Any:
+    """Adds the option --models, whose value `models` holds the paths of the user's own model folders.
+
+    The models are loaded before the other options are read (click's is_eager), because other options may name a model.
+    """
+    return click.option(
+        "--models",
+        multiple=True,
+        metavar="FOLDER",
+        is_eager=True,
+        callback=_use_models,
+        help="Folder of further reflectance models and lights, each NAME.py with NAME.glsl beside it. "
+        "The Python files are run. Repeatable.",
+    )(command)
+
+
+def _use_models(ctx: click.Context, option: click.Parameter, folders: tuple[str, ...]) -> tuple[str, ...]:
+    if folders and not ctx.resilient_parsing:
+        from glshade.scene.models import use_models
+
+        use_models(folders)
+    return folders
+
+
+def overrides(command: Any) -> Any:
+    """Adds the option --set, whose value `overrides` holds (key, text) pairs, as `glshade.load` takes them."""
+    return click.option(
+        "--set",
+        "overrides",
+        multiple=True,
+        metavar="KEY=VALUE",
+        callback=lambda ctx, param, texts: _assignments(texts, param),
+        help="Replaces a value of the scene: quality.fresnel=schlick, materials.body.roughness=0.3, "
+        "objects.ball.material=gold, lights.0.intensity=2, film.size=[640,360]. Repeatable.",
+    )(command)
+
+
+def _assignments(texts: tuple[str, ...], option: click.Parameter) -> list[tuple[str, str]]:
+    if not texts:
+        return []
+    from glshade.scene.override import split
+
+    try:
+        return [split(text) for text in texts]
+    except ValueError as error:
+        raise click.BadParameter(str(error), param=option) from None
+
+
+def filmed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
+    """Returns the scene with a changed film.
+
+    scene: the scene, which is not changed itself
+    changes: key of the film -> value; None changes nothing
+    Errors: click.BadParameter, which names the option that sets the key.
+    """
+    changes = {key: value for key, value in changes.items() if value is not None}
+    if not changes:
+        return scene
+    from pydantic import ValidationError
+
+    from glshade.scene.film import Film
+
+    try:
+        film = Film.model_validate({**scene.film.model_dump(), **changes})
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        key = str(first["loc"][0])
+        raise click.BadParameter(first["msg"], param_hint=f"'--{OPTIONS.get(key, key)}'") from None
+    return scene.model_copy(update={"film": film})

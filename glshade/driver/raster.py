@@ -1,0 +1,121 @@
+"""Raster: measures a driver's rasteriser: the grid to which it snaps corners, the corners from which it interpolates attributes
+(as given or snapped), and the positions of samples in a pixel.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glshade.driver.figures import rounded
+from glshade.driver.programs import load_program
+from glshade.gl.context import Context
+from glshade.gl.program import Program
+from glshade.gl.screen import Screen
+from glshade.reference.raster import SUBPIXELS
+
+Array = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+
+# The values of OpenGL's enumerants in Khronos' registry (gl.xml).
+GL_SUBPIXEL_BITS, GL_SAMPLE_POSITION = 0x0D50, 0x8E50
+
+
+def measure_raster(context: Context) -> dict[str, Any]:
+    """Measures three properties of the rasteriser. Returns a dictionary ready for JSON:
+
+    "subpixel_bits": the number of binary digits below one pixel of a corner's coordinates: "told" is the driver's own answer,
+        "measured" is the result of drawing.
+    "interpolation_shift_in_steps": see `_interpolation_shift`.
+    "sample_positions": see `_sample_positions`.
+    Errors: ShaderError, ContextError.
+    """
+    program = load_program(context, "driver/geometry.vert", "driver/geometry.frag")
+    return {
+        "subpixel_bits": {"told": _reported_subpixel_bits(context), "measured": _subpixel_bits(context, program)},
+        "interpolation_shift_in_steps": _interpolation_shift(context, program),
+        "sample_positions": _sample_positions(context),
+    }
+
+
+def _draw(context: Context, program: Program, size: tuple[int, int], corners: Array) -> Float32:
+    """Draws triangles on a screen and returns its pixels (H, W, 4); shaders/driver/geometry.frag explains their values.
+
+    size: width, height of the screen [pixels].
+    corners: (3 * T, 2), x and y of the corners of T triangles, from the lower left [pixels].
+    """
+    screen = Screen(context, size)
+    program.write("u_size", np.array(size, dtype=np.float32))
+    screen.draw_triangles(program, "a_corner", corners.astype(np.float32))
+    return screen.readback()
+
+
+def _reported_subpixel_bits(context: Context) -> int | None:
+    """Returns GL_SUBPIXEL_BITS; None if the backend cannot look up functions of OpenGL."""
+    get = context.procedure("glGetIntegerv", None, ctypes.c_uint, ctypes.POINTER(ctypes.c_int))
+    if get is None:
+        return None
+    value = ctypes.c_int()
+    get(GL_SUBPIXEL_BITS, ctypes.byref(value))
+    return value.value
+
+
+def _subpixel_bits(context: Context, program: Program) -> int:
+    """Returns the number of binary digits below one pixel to which the driver snaps corners.
+
+    To find it, this function counts how many grid points a corner takes while it slides over 1/16 pixel. Each of 256 columns
+    holds a quadrilateral whose left edge leans from x = 0.25 at the bottom to x = 0.75 + d at the top, where d grows from
+    column to column. The edge crosses the middle of its column at a height that depends on d: if d grows by 1/256 pixel, the
+    crossing moves by more than 12 of the 4096 rows. So two columns have equally many covered pixels only if the driver snaps
+    their upper left corners to the same grid point.
+    """
+    columns, rows = 256, 4096
+    column = np.arange(columns, dtype=np.float64)
+    d = column / 4096.0
+
+    def corner(x: Array, y: float) -> Array:
+        return np.stack([x, np.full(columns, y)], axis=1)
+
+    lower_left, upper_left = corner(column + 0.25, 0), corner(column + 0.75 + d, rows)
+    lower_right, upper_right = corner(column + 1.0, 0), corner(column + 1.0, rows)
+    lower = np.stack([lower_left, lower_right, upper_right], axis=1)
+    upper = np.stack([lower_left, upper_right, upper_left], axis=1)
+    pixels = _draw(context, program, (columns, rows), np.concatenate([lower, upper]).reshape(-1, 2))
+    heights = (pixels[..., 3] > 0).sum(axis=0)
+    steps = len(np.unique(heights)) - 1
+    return round(math.log2(steps * 16)) if steps > 0 else 0
+
+
+def _interpolation_shift(context: Context, program: Program) -> float:
+    """Returns how far attributes move if every corner lies 0.4 of a sub-pixel step beside the grid [steps].
+
+    The result is 0 if attributes are interpolated from the corners as given, and 0.4 if from the corners after snapping.
+    """
+    step = 0.4 / SUBPIXELS
+    corners = np.array([[2 + step, 2], [62 + step, 2], [2 + step, 62]])
+    pixels = _draw(context, program, (64, 64), corners)
+    shift = pixels[pixels[..., 3] > 0][:, 0].astype(np.float64)
+    return rounded(np.median(shift) * SUBPIXELS)
+
+
+def _sample_positions(context: Context) -> list[list[float]]:
+    """Returns the positions of the samples within a pixel, x and y from 0 to 1, for the largest number of samples.
+
+    The list is empty if the driver has no multisampling or if the backend cannot look up functions of OpenGL.
+    """
+    get = context.procedure("glGetMultisamplefv", None, ctypes.c_uint, ctypes.c_uint, ctypes.POINTER(ctypes.c_float))
+    samples = context.gl.max_samples
+    if get is None or samples < 2:
+        return []
+    # OpenGL reports the positions for the framebuffer that is bound.
+    context.gl.framebuffer([context.gl.renderbuffer((4, 4), 4, samples=samples)]).use()
+    found = []
+    for index in range(samples):
+        position = (ctypes.c_float * 2)()
+        get(GL_SAMPLE_POSITION, index, position)
+        found.append([rounded(position[0]), rounded(position[1])])
+    return found

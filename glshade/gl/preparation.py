@@ -1,0 +1,271 @@
+"""Preparation: turns an assembly into draw calls, each with its program, vertices, uniforms, textures and lights."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from glshade.assembly.assembly import Assembly
+from glshade.assembly.culling import facing
+from glshade.assembly.instance import Instance
+from glshade.errors import SceneError
+from glshade.gl.frame import FORMATS, Storage
+from glshade.gl.program import Program
+from glshade.gl.resources import Resources, texture_size
+from glshade.glsl.generator import generate
+from glshade.glsl.plan import PAGE, LightGroup, ProgramPlan
+from glshade.glsl.planner import plan_instance, with_equals
+from glshade.glsl.shaders import Shaders
+from glshade.glsl.source import Rewrite
+from glshade.glsl.uniforms import Values, ambient_radiance, light_pages, light_uniforms, object_uniforms, textures
+from glshade.mesh.mesh import Mesh
+from glshade.scene.scene import Scene
+
+Encoding = Literal["linear", "srgb"]
+# A page of lights: the group's key, the buffer that holds the lights, and their number.
+Page = tuple[str, moderngl.Buffer, int]
+# Flat inputs are used for pictures with at least this many pixels per triangle. Measurements on llvmpipe, with one and with
+# eight lights, show that they save time in such pictures.
+FLAT_PIXELS = 8
+
+
+class ApproximateWarning(UserWarning):
+    """Part of the picture is an approximation: intersecting blended surfaces are not sorted pixel by pixel."""
+
+
+@dataclass(eq=False)
+class DrawCall:
+    """One draw call, with the state to set before it.
+
+    instance: the instance that is drawn.
+    plan: the plan of its program.
+    program: the compiled program.
+    vertices: the vertex array of the instance, with its triangles in drawing order.
+    values: the uniforms of the object and its material.
+    samplers: (uniform name, texture) of each sampler.
+    lights: the uniforms of the groups of lights that have an exact count.
+    pages: the pages of the other lights, which are bound as uniform blocks.
+    added: whether this call draws a further page of lights and adds its light to the pixels of the first call.
+    """
+
+    instance: Instance
+    plan: ProgramPlan
+    program: Program
+    vertices: moderngl.VertexArray
+    values: Values
+    samplers: list[tuple[str, moderngl.Texture]]
+    lights: Values
+    pages: list[Page]
+    added: bool = False
+
+
+@dataclass(eq=False)
+class Prepared:
+    """A scene made ready to draw.
+
+    scene: the scene that was prepared.
+    assembly: the assembled scene.
+    calls: its draw calls, in drawing order.
+    shaders: the shader files that its programs are made from.
+    files: the paths of the shader files that its programs hold.
+    attributes: the attributes of a float picture of the scene; None until the renderer has computed them.
+    """
+
+    scene: Scene
+    assembly: Assembly
+    calls: list[DrawCall]
+    shaders: Shaders
+    files: frozenset[str]
+    attributes: dict[str, str] | None = None
+
+    def is_current(self) -> bool:
+        """Whether none of its shader files has changed."""
+        return self.shaders.is_current(self.files)
+
+    @property
+    def size(self) -> int:
+        """The approximate size of the data that it keeps alive [bytes]: textures, and meshes on the CPU and the GPU."""
+        texture_sizes = {id(texture): texture_size(texture) for call in self.calls for _, texture in call.samplers}
+        mesh_sizes = {id(call.instance.mesh): _mesh_size(call.instance.mesh) for call in self.calls}
+        return sum(texture_sizes.values()) + sum(mesh_sizes.values())
+
+    @property
+    def blends(self) -> bool:
+        """Whether the scene has any blended surface."""
+        return any(call.plan.alpha == "blend" for call in self.calls)
+
+    @property
+    def linear_storage(self) -> Storage:
+        """The format of frames in linear light.
+
+        Errors: SceneError if a light is negative and the format has no negative numbers, or if the scene needs alpha and the
+        format has none.
+        """
+        chosen = self.scene.quality.storage
+        if chosen is None or chosen == "auto":
+            return "rgba32f"
+        if chosen == "r11f_g11f_b10f" and any(light.is_negative for light in self.assembly.lights):
+            raise SceneError("quality.storage: r11f_g11f_b10f has nothing below zero, and a light of this scene is negative")
+        if FORMATS[chosen][1] == 3 and (len(self.scene.film.background) == 4 or self.blends):
+            raise SceneError(f"quality.storage: {chosen} has no alpha, which this scene asks for")
+        return chosen
+
+
+class Preparer:
+    """Prepares assemblies with the resources of one context."""
+
+    def __init__(self, resources: Resources) -> None:
+        self._resources = resources
+
+    def prepare(
+        self, scene: Scene, assembly: Assembly, encoding: Encoding, shaders: Shaders, rewrite: Rewrite | None = None
+    ) -> Prepared:
+        """The scene ready to draw, with everything that stays the same from picture to picture.
+
+        scene: the scene to draw.
+        assembly: the assembled scene.
+        encoding: the encoding that the programs write.
+        shaders: the shader files.
+        rewrite: optional; a function that is applied to every source before it is compiled.
+        Errors: SceneError, ShaderError.
+        """
+        calls = _Calls(self._resources, scene, assembly, shaders, rewrite)
+        return Prepared(scene, assembly, list(calls.draw_calls(encoding)), shaders, calls.files)
+
+
+class _Calls:
+    """Makes the draw calls of one scene.
+
+    files: the paths of the shader files of all programs that were made so far.
+    """
+
+    def __init__(
+        self, resources: Resources, scene: Scene, assembly: Assembly, shaders: Shaders, rewrite: Rewrite | None
+    ) -> None:
+        self._resources, self._context = resources, resources.context
+        self._assembly, self._exposure = assembly, scene.film.exposure
+        self._shaders, self._rewrite = shaders, rewrite
+        self._programs: dict[ProgramPlan, Program] = {}
+        self.files: frozenset[str] = frozenset()
+        triangles = sum(len(instance.mesh.triangles) for instance in assembly.instances)
+        width, height = scene.film.size
+        self._flat = self._context.is_software and triangles * FLAT_PIXELS <= width * height
+
+    def draw_calls(self, encoding: Encoding) -> Iterator[DrawCall]:
+        """The draw calls: opaque instances grouped by program, then blended ones from back to front."""
+        opaque: list[tuple[ProgramPlan, Instance]] = []
+        blended: list[tuple[ProgramPlan, Instance]] = []
+        for instance in self._assembly.instances:
+            plan = plan_instance(instance, self._assembly, encoding)
+            (blended if plan.alpha == "blend" else opaque).append((plan, instance))
+        order = {plan: index for index, (plan, _) in reversed(list(enumerate(opaque)))}
+        opaque.sort(key=lambda pair: order[pair[0]])
+        shared: dict[tuple[ProgramPlan, tuple[int, ...]], tuple[Values, list[list[Page]]]] = {}
+        for plan, instance in (*opaque, *self._back_to_front(blended)):
+            key = plan, instance.lights
+            if key not in shared:
+                lights = light_uniforms(plan, self._assembly, instance.lights, self._exposure)
+                _check_finite(instance, lights)
+                shared[key] = lights, self._pages(plan, instance)
+            yield from self._of_instance(plan, instance, *shared[key])
+
+    def _back_to_front(self, blended: list[tuple[ProgramPlan, Instance]]) -> list[tuple[ProgramPlan, Instance]]:
+        """Blended instances, ordered by the mean of their vertices, the farthest first."""
+        if not blended:
+            return []
+        warnings.warn(
+            "blended surfaces are drawn back to front, triangle by triangle: the picture is approximate where they intersect",
+            ApproximateWarning,
+            stacklevel=7,
+        )
+        middles = []
+        for _, instance in blended:
+            world = instance.world_from_object
+            middles.append(world[:3, 3] + world[:3, :3] @ instance.mesh.positions.mean(axis=0, dtype=np.float64))
+        depths = self._assembly.view.depth(np.array(middles))
+        return [blended[i] for i in np.argsort(-depths, kind="stable")]
+
+    def _of_instance(
+        self, plan: ProgramPlan, instance: Instance, lights: Values, pages: list[list[Page]]
+    ) -> Iterator[DrawCall]:
+        """The first draw call of an instance, and one more for every further page of lights."""
+        assembly = self._assembly
+        triangles = _sorted_triangles(instance, assembly) if plan.alpha == "blend" else facing(instance, assembly.view)
+        for index in range(max((len(group) for group in pages), default=1)):
+            page_plan = plan if index == 0 else _further(plan, instance, pages, index)
+            program = self._program(page_plan)
+            values = object_uniforms(page_plan, instance, assembly.view.eye)
+            if page_plan.ambient == "constant":
+                values |= ambient_radiance(instance, assembly, self._exposure)
+            _check_finite(instance, values)
+            all_texels = textures(page_plan, instance.material)
+            samplers = [(name, self._resources.texture(texels)) for name, texels in all_texels.items()]
+            vertices = self._resources.vertices.array(instance.mesh, program, triangles)
+            page = [group[index] for group in pages if index < len(group)]
+            page_lights = {} if index else lights
+            yield DrawCall(instance, page_plan, program, vertices, values, samplers, page_lights, page, bool(index))
+
+    def _program(self, plan: ProgramPlan) -> Program:
+        if plan not in self._programs:
+            source = generate(plan, self._shaders)
+            self.files |= source.files
+            self._programs[plan] = self._resources.program(self._rewrite(source) if self._rewrite else source, self._flat)
+        return self._programs[plan]
+
+    def _pages(self, plan: ProgramPlan, instance: Instance) -> list[list[Page]]:
+        """The pages of lights of each group that has no exact count."""
+        result = []
+        for group in _paged(plan):
+            lights = [self._assembly.lights[i] for i in instance.lights if group.holds(self._assembly.lights[i])]
+            records = light_pages(group, lights, self._assembly.view.eye, self._exposure, PAGE)
+            whole = PAGE * records[0].dtype.itemsize
+            result.append([(group.key, self._context.gl.buffer(r.tobytes().ljust(whole, b"\0")), len(r)) for r in records])
+        return result
+
+
+def _mesh_size(mesh: Mesh) -> int:
+    """The approximate size of a mesh on the CPU and the GPU together [bytes].
+
+    All attributes of a vertex together count as three times its position.
+    """
+    return 2 * (mesh.triangles.nbytes + 3 * mesh.positions.nbytes)
+
+
+def _paged(plan: ProgramPlan) -> list[LightGroup]:
+    return [group for group in plan.lights if group.count == 0]
+
+
+def _further(plan: ProgramPlan, instance: Instance, pages: list[list[Page]], index: int) -> ProgramPlan:
+    """The plan of a further page of lights. The first call has already drawn ambient light and groups with an exact count.
+
+    plan: the plan of the first call.
+    instance: the instance that is drawn.
+    pages: the pages of each group without an exact count.
+    index: the number of the page, from 1.
+    """
+    groups = tuple(group for group, group_pages in zip(_paged(plan), pages, strict=True) if index < len(group_pages))
+    asked: set[str] = set()
+    for group in groups:
+        asked |= with_equals(instance.material, instance.material.asked("ambient" if group.omnidirectional else "light"))
+    parameters = tuple((name, use if name in asked else "unused") for name, use in plan.parameters)
+    return replace(plan, lights=groups, ambient="none", parameters=parameters)
+
+
+def _check_finite(instance: Instance, values: Values) -> None:
+    """Raises SceneError, with the value's name, if a value is too large for float32."""
+    for name, value in values.items():
+        if not np.isfinite(value).all():
+            raise SceneError(f"{instance.name}: {name.removeprefix('u_')} is too large for float32")
+
+
+def _sorted_triangles(instance: Instance, assembly: Assembly) -> NDArray[np.uint32]:
+    """The triangles (T, 3) of an instance, ordered by their centroids from back to front."""
+    centroids = instance.mesh.positions[instance.mesh.triangles].mean(axis=1, dtype=np.float64)
+    world = centroids @ instance.world_from_object[:3, :3].T + instance.world_from_object[:3, 3]
+    return instance.mesh.triangles[np.argsort(-assembly.view.depth(world), kind="stable")]

@@ -1,0 +1,110 @@
+"""Resources: the LRU caches of one context, for programs, textures, frames and pixel arrays."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from glshade.gl.context import Context
+from glshade.gl.frame import FORMATS, Frame, Storage
+from glshade.gl.program import Program
+from glshade.gl.textures import upload
+from glshade.gl.vertices import Vertices
+from glshade.glsl.flat_inputs import with_flat_inputs
+from glshade.glsl.source import Source
+from glshade.lru import Lru
+from glshade.textures.texels import Texels
+
+# A program takes about this much memory [bytes]. llvmpipe keeps the machine code of each of its variants: 0.7 MiB were measured
+# with one light, and 3.6 MiB with eight.
+PROGRAM = 2 << 20
+# The limit of the cache of programs [bytes].
+PROGRAMS = 192 << 20
+# The limit of the cache of textures [bytes]. A texture of 1024 x 1024 texels takes 21 MiB with its mipmaps.
+TEXTURES = 96 << 20
+# The limit of the cache of frames [bytes].
+FRAMES = 256 << 20
+# The number of frames that are never evicted: a frame in linear light and the one that it is encoded into are used together.
+FRAMES_IN_USE = 2
+
+
+class Resources:
+    """The cached objects of one context. An evicted object stays alive as long as other code refers to it.
+
+    No method calls release(): moderngl's gc() frees an object once its last reference has gone, and fails if both happen.
+
+    context: the OpenGL context of the objects.
+    vertices: the buffers of the meshes.
+    """
+
+    def __init__(self, context: Context) -> None:
+        self.context = context
+        self.vertices = Vertices(context)
+        self._programs: Lru[tuple[Source, bool], Program] = Lru(PROGRAMS)
+        self._textures: Lru[tuple[Texels, int], moderngl.Texture] = Lru(TEXTURES)
+        self._frames: Lru[tuple[tuple[int, int], Storage, int], Frame] = Lru(FRAMES, spare=FRAMES_IN_USE)
+        self._pixels: list[NDArray[Any]] = []
+
+    def program(self, source: Source, flat: bool = False) -> Program:
+        """The compiled program of a source.
+
+        source: the text of the program.
+        flat: whether the fragment stage gets flat inputs in place of uniforms; the pictures are the same.
+        Errors: ShaderError.
+        """
+
+        def make() -> Program:
+            written = with_flat_inputs(source, self.context.passed_vectors) if flat else source
+            return Program(self.context, written)
+
+        return self._programs.find((source, flat), make, lambda _: PROGRAM)
+
+    def texture(self, texels: Texels) -> moderngl.Texture:
+        """The texture of a picture file, loaded again if the file has changed. Errors: AssetError."""
+        key = texels, texels.path.stat().st_mtime_ns
+        return self._textures.find(key, lambda: upload(self.context, texels), texture_size)
+
+    def frame(self, size: tuple[int, int], storage: Storage, samples: int) -> Frame:
+        """A frame to draw into, which may hold an earlier picture.
+
+        size: width and height [pixels].
+        storage: the format of the colours.
+        samples: the number of samples per pixel.
+        """
+
+        def bytes_of(_: Frame) -> int:
+            channels = FORMATS[storage][1]
+            # Every sample has colours and depth of 4 bytes per number; several samples are resolved to another buffer.
+            return size[0] * size[1] * (samples * (channels * 4 + 4) + (channels * 4 if samples > 1 else 0))
+
+        return self._frames.find((size, storage, samples), lambda: Frame(self.context, size, storage, samples), bytes_of)
+
+    def pixels(self, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+        """An uninitialised array for a picture. An earlier array is reused if no image refers to it, because a new one takes
+        longer to fill."""
+        for array, references in zip(self._pixels, _references(self._pixels), strict=True):
+            if references == FREE and array.shape == shape and array.dtype == dtype:
+                return array
+        self._pixels = [*self._pixels[-1:], np.empty(shape, dtype=dtype)]
+        return self._pixels[-1]
+
+
+def texture_size(texture: moderngl.Texture) -> int:
+    """The approximate size of a float32 texture with its mipmaps [bytes]."""
+    width, height = texture.size
+    numbers: int = width * height * texture.components
+    # A number takes 4 bytes, and the mipmaps add a third.
+    return numbers * 4 * 4 // 3
+
+
+def _references(arrays: list[NDArray[Any]]) -> list[int]:
+    """The number of references to each array, including those of the list and of this function."""
+    return [sys.getrefcount(array) for array in arrays]
+
+
+# The result of _references for an array that only the list refers to; it differs between versions of Python.
+FREE = _references([np.empty(0)])[0]

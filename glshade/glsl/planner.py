@@ -1,0 +1,189 @@
+"""Planner: makes the plan of each instance of a scene, in canonical form."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable
+from typing import Literal
+
+from glshade.assembly.assembly import Assembly
+from glshade.assembly.instance import Instance
+from glshade.assembly.values import ambient_reflectance, turn
+from glshade.brdfs import BRDFS, Brdf
+from glshade.glsl.plan import EXACT_LIGHTS, PAGE, LightGroup, Plan, ProgramPlan, Viewer, is_grey, is_white, kind
+from glshade.glsl.reasoning import reasons
+from glshade.lights import Falloff, Light
+from glshade.radiance.readying import ready
+from glshade.scene.camera import View
+from glshade.scene.object import Rate
+from glshade.scene.scene import Scene
+from glshade.textures.texels import Texels, texels_of
+from glshade.textures.texture import DirectionMap, Texture
+
+# viewer/perspective.glsl is used only if the near plane is at least this far away, in the assembly's unit. The square of a
+# shorter vector to the viewer comes close to the smallest normal float32 (1.2e-38). No visible point is nearer than the near
+# plane.
+CLOSEST = 1e-15
+
+
+def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["linear", "srgb"]) -> ProgramPlan:
+    """The plan of the program for one instance, in canonical form: features that cannot show in the picture are left out."""
+    if instance.shows != "light":
+        return _bare(instance, assembly, encoding)
+    material = instance.material
+    model = BRDFS[material.brdf]
+    base = model.base()
+    reached = [assembly.lights[i] for i in instance.lights]
+    seen = with_equals(material, material.asked("ambient"))
+    varies = (instance.vertex_colours and base in seen) or any(isinstance(getattr(material, name), Texture) for name in seen)
+    answers_to_ambient = varies or ambient_reflectance(material).any()
+    # Without textures and vertex colours, ambient light adds one colour, which is computed on the CPU.
+    ambient: Literal["none", "constant", "varying"] = "none"
+    if answers_to_ambient and any(light.ignores_normal for light in reached):
+        ambient = "varying" if varies else "constant"
+    # Some models reflect only ambient light, others only light from a direction.
+    groups = _groups(
+        light
+        for light in reached
+        if not light.ignores_normal and (answers_to_ambient if light.omnidirectional else material.asked("light"))
+    )
+    directed = any(not group.omnidirectional for group in groups)
+    asked = with_equals(material, material.asked("light")) if directed else frozenset()
+    if ambient == "varying" or any(group.omnidirectional for group in groups):
+        asked |= seen
+    parameters, shared = [], []
+    pictures: dict[Texels, str] = {}
+    for name, declared in model.parameters().items():
+        value = getattr(material, name)
+        if name not in asked:
+            use: str = "unused"
+        elif value is None and declared.same_as is not None:
+            use = declared.same_as
+        else:
+            grey = model.is_colour(name) and not isinstance(value, Texture) and is_grey(value)
+            use = "grey" if grey else "uniform"
+            if isinstance(value, Texture):
+                use = "texture" if model.is_colour(name) else f"texture.{value.channel or 'r'}"
+                first = pictures.setdefault(texels_of(material, name), name)
+                if first != name:
+                    shared.append((name, first))
+        parameters.append((name, use))
+    carries_alpha = material.alpha_mode != "opaque" and base is not None and isinstance(getattr(material, base), Texture)
+    vertex_colours = instance.vertex_colours and (base in asked or material.alpha_mode != "opaque")
+    # If alpha is the same everywhere and at least the cutoff, no fragment is cut out.
+    whole = not (carries_alpha or vertex_colours) and material.alpha >= material.alpha_cutoff
+    bumpy = (material.normal_map is not None or material.bump_map is not None) and bool(groups)
+    tangents = material.needs_tangents and directed
+    return ProgramPlan(
+        rate=instance.rate,
+        brdf=material.brdf,
+        slots=tuple(material.slots().items()) if groups or ambient == "varying" else (),
+        parameters=tuple(parameters),
+        lights=groups,
+        ambient=ambient,
+        viewer=_viewer(assembly.view),
+        both_sides=instance.back_faces and bool(groups),
+        alpha="opaque" if material.alpha_mode == "mask" and whole else material.alpha_mode,
+        alpha_from=base if carries_alpha else None,
+        vertex_colours=vertex_colours,
+        normal_map=bumpy,
+        anisotropic=tangents,
+        encoding=encoding,
+        shared=tuple(shared),
+        normal_span=texels_of(material, "bump_map").span if bumpy and material.bump_map else (1, 1),
+        turned=tangents and turn(material) % 360 != 0,
+        direction_map=tangents and isinstance(material.tangent_direction, DirectionMap),
+        normalise=instance.quality.normalise is not False or not groups or instance.rate != "phong" or bumpy or tangents,
+        arithmetic=(instance.quality.arithmetic if groups else None) or "stable",
+    )
+
+
+def _groups(lights: Iterable[Light]) -> tuple[LightGroup, ...]:
+    """The groups of the lights. At most EXACT_LIGHTS of a kind make a white and a coloured group, more make one paged group."""
+    kinds: dict[tuple[str, Falloff], Counter[bool]] = {}
+    for light in lights:
+        kinds.setdefault(kind(light), Counter())[is_white(light)] += 1
+    groups: list[LightGroup] = []
+    for (name, falloff), counts in sorted(kinds.items()):
+        if counts.total() > EXACT_LIGHTS:
+            groups.append(LightGroup(name, falloff, False, 0))
+        else:
+            groups += [LightGroup(name, falloff, white, counts[white]) for white in (False, True) if counts[white]]
+    return tuple(groups)
+
+
+def _viewer(view: View) -> Viewer:
+    if not view.perspective:
+        return "orthographic"
+    return "perspective" if view.near >= CLOSEST else "perspective_close"
+
+
+def _bare(instance: Instance, assembly: Assembly, encoding: Literal["linear", "srgb"]) -> ProgramPlan:
+    """The plan of a program that shows a depth, normal or uv in place of light. It has no lights, but the same cut-outs."""
+    material = instance.material
+    base = material.base()
+    masked = material.alpha_mode == "mask"
+    carries_alpha = masked and base is not None and isinstance(getattr(material, base), Texture)
+    vertex_alpha = masked and instance.vertex_colours
+    whole = not (carries_alpha or vertex_alpha) and material.alpha >= material.alpha_cutoff
+    normal = instance.shows == "normal"
+    return ProgramPlan(
+        rate=instance.rate,
+        brdf=material.brdf,
+        slots=(),
+        parameters=(),
+        lights=(),
+        ambient="none",
+        viewer=_viewer(assembly.view),
+        both_sides=normal and instance.back_faces,
+        alpha="mask" if masked and not whole else "opaque",
+        alpha_from=base if carries_alpha else None,
+        vertex_colours=vertex_alpha,
+        normal_map=normal and bool(material.normal_map or material.bump_map),
+        anisotropic=False,
+        encoding=encoding,
+        normal_span=texels_of(material, "bump_map").span if normal and material.bump_map else (1, 1),
+        shows=instance.shows,
+    )
+
+
+def with_equals(material: Brdf, asked: frozenset[str]) -> frozenset[str]:
+    """The parameters that are asked for. If one is left out, the parameter whose value it takes is included too."""
+    declared = material.parameters()
+    return asked | {declared[name].same_as or name for name in asked if getattr(material, name) is None}
+
+
+def explain(scene: Scene, shading: Rate | None = None) -> Plan:
+    """The plan of a scene: its programs, and the reason for each of their features.
+
+    scene: the scene to plan.
+    shading: optional; replaces the shading rate of every object.
+    Errors: SceneError.
+    """
+    assembly = ready(scene, shading)
+    film, storage = scene.film, scene.quality.storage
+    # Averaging samples, blending and adding pages of lights have to happen in linear light, before the encoding.
+    direct = film.direct and storage in (None, "auto")
+    direct &= not any(i.material.alpha_mode == "blend" or _has_pages(i, assembly) for i in assembly.instances)
+    return plan(assembly, film.encoding if direct else "linear")
+
+
+def _has_pages(instance: Instance, assembly: Assembly) -> bool:
+    """Whether the instance is lit by more lights of a kind than one draw call takes."""
+    reached = (assembly.lights[i] for i in instance.lights)
+    is_lit = bool(instance.material.asked("light"))
+    counts = Counter(kind(light) for light in reached if not light.ignores_normal and (is_lit or light.omnidirectional))
+    return max(counts.values(), default=0) > PAGE
+
+
+def plan(assembly: Assembly, encoding: Literal["linear", "srgb"]) -> Plan:
+    """The plan of an assembled scene."""
+    programs: dict[ProgramPlan, int] = {}
+    draws: list[tuple[str, int]] = []
+    why: dict[str, str] = {}
+    for instance in assembly.instances:
+        program = plan_instance(instance, assembly, encoding)
+        draws.append((instance.name, programs.setdefault(program, len(programs))))
+        for feature, reason in reasons(program, instance, assembly):
+            why.setdefault(feature, reason)
+    return Plan(tuple(programs), tuple(draws), tuple(why.items()))

@@ -1,0 +1,33 @@
+"""Contents: the numbers and texts of one picture file, on their way into the file or out of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, eq=False)
+class PictureContents:
+    """The numbers and texts of one picture file.
+
+    pixels: (H, W, C), row 0 at the top. A file is written from uint8 or float32. Reading gives float32: integers are divided by
+        the largest value of their type, floats stay as they are.
+    encoding: "srgb", "linear", or the colour interop id of another colour space.
+    premultiplied: True where the colours are multiplied by alpha.
+    channels: optional names of the C channels; by default R, G, B, A.
+    attributes: texts about the picture, by name. Reading leaves them out.
+    corner: x, y of the pixels' top left corner in the whole picture [pixels].
+    whole: width, height of the picture that the pixels were cropped from [pixels]; None where they are all of it.
+    """
+
+    pixels: NDArray[Any]
+    encoding: str
+    premultiplied: bool
+    channels: Sequence[str] | None = None
+    attributes: Mapping[str, str] = field(default_factory=dict)
+    corner: tuple[int, int] = (0, 0)
+    whole: tuple[int, int] | None = None

@@ -1,0 +1,109 @@
+"""OpenImageIO: writes and reads picture files with the library of that name, for most formats."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+from numpy.typing import NDArray
+
+from glshade.image.contents import PictureContents
+
+
+def write(path: Path, contents: PictureContents, settings: Mapping[str, str | int], window: bool) -> None:
+    """Writes a picture file in the format that the suffix of `path` names.
+
+    settings: OpenImageIO's attributes of the file, by name, in the order in which they are set.
+    window: True to store the place of a crop and the size of the whole picture.
+    Errors: OSError, with the reason as its text.
+    """
+    spec = _spec(contents)
+    if window:
+        spec.x, spec.y = contents.corner
+        spec.full_width, spec.full_height = contents.whole or (spec.width, spec.height)
+    for name, value in settings.items():
+        spec.attribute(name, value)
+    output = oiio.ImageOutput.create(str(path))
+    if output is None:
+        raise OSError(_one_line(oiio.geterror()))
+    written = output.open(str(path), spec) and output.write_image(_contiguous(contents.pixels))
+    # close() writes the buffered rest. On a full disk it may return True and leave an error message. A message about
+    # Exif is no failure: the TIFF writer leaves it if it could not add a table of Exif data.
+    closed = output.close()
+    message = _one_line(output.geterror())
+    if not (closed and written) or (message and "Exif" not in message):
+        raise OSError(message or _one_line(oiio.geterror()))
+
+
+def read(path: Path) -> PictureContents:
+    """Returns the pixels of the first part of a picture file, at its largest size: (H, W, C) float32.
+
+    Integers count as sRGB-encoded, floats as linear. Errors: OSError, with the reason as its text.
+    """
+    keep_straight_alpha = oiio.ImageSpec()
+    keep_straight_alpha.attribute("oiio:UnassociatedAlpha", 1)
+    source = _opened(path, keep_straight_alpha)
+    spec = source.spec()
+    pixels = source.read_image(oiio.FLOAT)
+    message = _one_line(source.geterror())
+    source.close()
+    if pixels is None or message:
+        raise OSError(message or "no pixels")
+    return PictureContents(
+        np.asarray(pixels, dtype=np.float32).reshape(spec.height, spec.width, spec.nchannels),
+        encoding="linear" if str(spec.format) in {"float", "half", "double"} else "srgb",
+        premultiplied=not spec.get_int_attribute("oiio:UnassociatedAlpha"),
+    )
+
+
+def attributes(path: Path) -> dict[str, str]:
+    """Returns the texts in a file's header, by name, without reading its pixels.
+
+    Errors: OSError, with the reason as its text.
+    """
+    source = _opened(path)
+    texts = {item.name: item.value for item in source.spec().extra_attribs if isinstance(item.value, str)}
+    source.close()
+    return texts
+
+
+def _opened(path: Path, *config: oiio.ImageSpec) -> Any:
+    """Returns the file, opened for reading. Errors: OSError."""
+    source = oiio.ImageInput.open(str(path), *config)
+    if source is None:
+        raise OSError(_one_line(oiio.geterror()))
+    return source
+
+
+def _spec(contents: PictureContents) -> oiio.ImageSpec:
+    """Returns OpenImageIO's description of the pixels: their size, type, channels, colour space and kind of alpha."""
+    height, width, count = contents.pixels.shape
+    spec = oiio.ImageSpec(width, height, count, "float" if contents.pixels.dtype == "float32" else "uint8")
+    if contents.channels is not None:
+        spec.channelnames = tuple(contents.channels)
+    # Programs take an 8-bit file for sRGB by default, and naming sRGB would make OpenImageIO load a colour configuration, which
+    # takes 20 ms.
+    if contents.encoding != "srgb":
+        spec.attribute("oiio:ColorSpace", "lin_rec709" if contents.encoding == "linear" else contents.encoding)
+    if count == 4 and not contents.premultiplied:
+        spec.attribute("oiio:UnassociatedAlpha", 1)
+    return spec
+
+
+def _contiguous(pixels: NDArray[Any]) -> NDArray[Any]:
+    """Returns the same pixels (H, W, C), contiguous in memory as OpenImageIO needs them."""
+    if pixels.flags.c_contiguous:
+        return pixels
+    result = np.empty(pixels.shape, dtype=pixels.dtype)
+    # One channel at a time: NumPy takes five times as long to copy three of four channels at once.
+    for channel in range(pixels.shape[2]):
+        result[..., channel] = pixels[..., channel]
+    return result
+
+
+def _one_line(message: str) -> str:
+    """Returns a message in one line, without the line breaks that OpenImageIO puts into it."""
+    return "; ".join(line.strip() for line in message.splitlines() if line.strip())

@@ -1,0 +1,112 @@
+"""Entries: mesh files in the user's cache folder, in a form that needs no parser.
+
+An entry is a folder with the arrays of the meshes, the pictures that the file embeds, and `entry.json` with the parts and the
+state of every other file that was looked at.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import fields
+from pathlib import Path
+
+import numpy as np
+
+from glshade.files import user_cache
+from glshade.mesh.mesh import Mesh
+from glshade.mesh.model import model_of
+from glshade.mesh.reading.contents import Contents
+
+
+def entry_of(key: str) -> Path:
+    """Returns the folder of the entry with this key. It need not exist yet."""
+    return user_cache().part("meshes") / key
+
+
+def recall(folder: Path) -> Contents | None:
+    """Returns the contents of an entry; None if it does not exist, is damaged, or depends on a file that has changed."""
+    try:
+        stored = json.loads((folder / "entry.json").read_bytes())
+        contents = Contents()
+        contents.parts, contents.warnings = stored["parts"], stored["warnings"]
+        contents.dependencies = stored["dependencies"]
+        if any(_state(Path(file), state) != state for file, state in contents.dependencies.items()):
+            return None
+        for index, names in enumerate(stored["meshes"]):
+            arrays = {name: np.load(folder / f"{index}.{name}.npy", allow_pickle=False) for name in names}
+            contents.meshes.append(Mesh(**arrays))
+        if not all((folder / name).is_file() for name in stored["images"]):
+            return None
+        model_of(contents, folder)  # raises if an index or a transform is wrong
+    except Exception:  # a damaged entry may raise anything, and the mesh file itself can be read instead
+        return None
+    user_cache().used(folder)
+    return contents
+
+
+def keep(contents: Contents, folder: Path) -> Path:
+    """Writes an entry and returns its folder.
+
+    Where the cache folder cannot be written, the embedded pictures are written to a temporary folder, which is returned and
+    which is deleted when the process ends.
+    """
+    import atexit
+    import shutil
+    import tempfile
+
+    partial: Path | None = None
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        partial = Path(tempfile.mkdtemp(prefix=f"{folder.name}.", dir=folder.parent))
+        _write(contents, partial)
+        try:
+            partial.rename(folder)
+        except OSError:
+            # There is an entry already. Either another process has just written it from the same bytes, or it is outdated.
+            if recall(folder) is None:
+                shutil.rmtree(folder, ignore_errors=True)
+                partial.rename(folder)
+            else:
+                shutil.rmtree(partial, ignore_errors=True)
+        user_cache().added(folder)
+        return folder
+    except OSError:
+        if partial is not None:
+            shutil.rmtree(partial, ignore_errors=True)
+    if contents.images:
+        folder = Path(tempfile.mkdtemp(prefix="glshade-"))
+        atexit.register(shutil.rmtree, folder, ignore_errors=True)
+        _write_images(contents, folder)
+    return folder
+
+
+def _write(contents: Contents, folder: Path) -> None:
+    """Writes the files of an entry into a folder. Errors: OSError."""
+    names = []
+    for index, mesh in enumerate(contents.meshes):
+        arrays = {f.name: getattr(mesh, f.name) for f in fields(mesh) if getattr(mesh, f.name) is not None}
+        for name, array in arrays.items():
+            np.save(folder / f"{index}.{name}.npy", array)
+        names.append(list(arrays))
+    _write_images(contents, folder)
+    entry = {
+        "meshes": names,
+        "parts": contents.parts,
+        "images": list(contents.images),
+        "dependencies": contents.dependencies,
+        "warnings": contents.warnings,
+    }
+    (folder / "entry.json").write_text(json.dumps(entry))
+
+
+def _write_images(contents: Contents, folder: Path) -> None:
+    for name, data in contents.images.items():
+        (folder / name).write_bytes(data)
+
+
+def _state(path: Path, recorded: str | None) -> str | None:
+    """Returns the state of a dependency now, in the form of the recorded state (see Contents.dependencies)."""
+    if not path.is_file():
+        return None
+    return "present" if recorded == "present" else hashlib.sha256(path.read_bytes()).hexdigest()

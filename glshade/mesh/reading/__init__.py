@@ -1,0 +1,1 @@
+"""Reading: the parts that the readers of mesh formats share."""

@@ -1,6 +1,0 @@
-#include "lib/frame.glsl"
-
-// The frame turned about its normal; d = (cos, sin) of the angle, from the tangent toward the bitangent.
-Frame turned_frame(Frame f, vec2 d) {
-    return Frame(f.n, d.x * f.t + d.y * f.b, d.x * f.b - d.y * f.t);
-}
