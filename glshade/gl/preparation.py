@@ -118,7 +118,7 @@ class Prepared:
 
 
 class Preparer:
-    """Prepares assemblies with the resources of one context."""
+    """Turns assemblies into draw calls that use the programs, buffers and textures of one context."""
 
     def __init__(self, resources: Resources) -> None:
         self._resources = resources

@@ -206,14 +206,11 @@ class _Expansion:
         if isinstance(code, str):
             self._written(name, code.splitlines())
             return
-        blocks = {str(block.name): block for block in code.blocks}
         for number, entry in enumerate(code.entries, 1):
             if isinstance(entry, Include):
                 self._include(entry.name, f"{name}:{number}")
-            elif isinstance(entry, Declaration):
-                self._add(str(entry), name, number, entry)
             else:
-                self._add(entry, name, number, blocks.get(entry.split(" ")[2]) if entry.startswith("layout(") else None)
+                self._add(str(entry), name, number, entry if isinstance(entry, Declaration) else None)
 
     def _written(self, file: str, lines: Iterable[str]) -> None:
         """Adds the text of a file: its includes are resolved, and its declarations are recognised."""

@@ -28,7 +28,9 @@ class Declaration:
     qualifier: str = ""
 
     def __str__(self) -> str:
-        """The declaration as a line of GLSL."""
+        """The declaration as a line of GLSL; for a block, its first line."""
+        if self.storage == "block":
+            return f"layout(std140) uniform {self.name} {{"
         array = f"[{self.count}]" if self.count else ""
         return " ".join(filter(None, [self.qualifier, self.storage, self.type, f"{self.name}{array};"]))
 
@@ -43,8 +45,7 @@ class Include:
     name: str
 
 
-# A line of GLSL text, a declaration or an include. A uniform block takes several lines. They are stored as text, and the
-# block's declaration is in Code.blocks.
+# A line of GLSL text, a declaration or an include. The lines that follow a block's declaration are text.
 Entry: TypeAlias = "str | Declaration | Include"
 
 
@@ -53,11 +54,9 @@ class Code:
     """Generated GLSL.
 
     entries: lines of text, declarations and includes, in their order.
-    blocks: the declarations of the uniform blocks among the lines of text.
     """
 
     entries: list[Entry] = field(default_factory=list)
-    blocks: list[Declaration] = field(default_factory=list)
 
     def __bool__(self) -> bool:
         return bool(self.entries)
@@ -89,13 +88,12 @@ class Code:
 
     def block(self, name: str, members: str) -> Code:
         """Adds a uniform block in the std140 layout. members: the lines that declare its members."""
-        self.blocks.append(Declaration("block", "", name))
-        return self.add(f"layout(std140) uniform {name} {{\n{members}}};")
+        self.entries.append(Declaration("block", "", name))
+        return self.add(f"{members}}};")
 
     def join(self, other: Code) -> Code:
         """Appends other code."""
         self.entries += other.entries
-        self.blocks += other.blocks
         return self
 
 

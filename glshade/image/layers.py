@@ -104,7 +104,7 @@ class Layers:
 
 
 def layers_path(path: Path) -> Path:
-    """Returns the file for the layers of a picture whose own file cannot hold them."""
+    """Returns the path of the separate file that stores a picture's layers if the picture's format cannot store them."""
     return path.with_name(f"{path.stem}.aovs.exr")
 
 

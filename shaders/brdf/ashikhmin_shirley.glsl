@@ -39,7 +39,7 @@ vec3 brdf_cos(AshikhminShirley m, Frame f, vec3 l, vec3 v) {
     float dl = 0.5 * NoL * (1.0 + a * (1.0 + a * (1.0 + a * (1.0 + a))));
     float dv = 0.5 * NoV * (1.0 + b * (1.0 + b * (1.0 + b * (1.0 + b))));
     float diffuse = 28.0 / 23.0 * INV_PI * dl * dv * NoL;
-    // Below 1e-12, |H|^2 is rounding error: l = -v, and there is no half vector. The conditions below also drop infinities and
+    // Below 1e-12, |H|^2 is only a rounding error: l is -v, and there is no half vector. The conditions below also drop infinities and
     // NaN.
     bool lit = NoL > 0.0 && NoV > 0.0;
     return m.kd * (1.0 - m.ks) * (lit ? diffuse : 0.0) + f_schlick(m.ks, LoH) * (lit && H2 > 1e-12 ? specular : 0.0);

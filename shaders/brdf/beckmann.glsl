@@ -28,7 +28,7 @@ vec3 brdf_cos(Beckmann m, Frame f, vec3 l, vec3 v) {
     float NoH = (NoL + NoV) / divisor;
     float alpha = microfacet_alpha(m.roughness);
     float specular = d_beckmann(f.n, h, NoH, alpha, visible(NoL, NoV, H2, NoH, alpha));
-    // Below 1e-12, |H|^2 is rounding error: l = -v, and there is no half vector. The conditions below also drop infinities and
+    // Below 1e-12, |H|^2 is only a rounding error: l is -v, and there is no half vector. The conditions below also drop infinities and
     // NaN.
     bool lit = NoL > 0.0 && NoV > 0.0;
     return diffuse(m.kd, m.eta, m.k, lit ? NoL : 0.0, max(NoV, 0.0)) +

@@ -14,7 +14,7 @@ vec3 brdf_cos(BlinnPhong m, Frame f, vec3 l, vec3 v) {
     float NoL = dot(f.n, l);
     float NoV = dot(f.n, v);
     vec3 H = l + v;
-    // Below 1e-12, |H|^2 is rounding error: l = -v, and there is no half vector.
+    // If |H|^2 is below 1e-12, it is only a rounding error: l is -v, and there is no half vector.
     float H2 = dot(H, H);
     float lobe = H2 > 1e-12 ? cospow(f.n, H * inversesqrt(max(H2, 1e-12)), m.exponent) : 0.0;
     float lit = NoL > 0.0 && NoV > 0.0 ? INV_PI : 0.0;

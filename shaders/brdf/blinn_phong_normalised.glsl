@@ -14,7 +14,7 @@ vec3 brdf_cos(BlinnPhongNormalised m, Frame f, vec3 l, vec3 v) {
     float NoL = dot(f.n, l);
     float NoV = dot(f.n, v);
     vec3 H = l + v;
-    // Below 1e-12, |H|^2 is rounding error: l = -v, and there is no half vector.
+    // Below 1e-12, |H|^2 is only a rounding error: l is -v, and there is no half vector.
     float H2 = dot(H, H);
     // The square root of the lobe is squared last: its tail would be flushed to 0 before the factor in p makes it large again.
     float root = H2 > 1e-12 ? cospow(f.n, H * inversesqrt(max(H2, 1e-12)), 0.5 * m.exponent) : 0.0;

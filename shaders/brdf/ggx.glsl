@@ -24,7 +24,7 @@ vec3 brdf_cos(Ggx m, Frame f, vec3 l, vec3 v) {
     float LoH = cos_half(l, v, length_H);
     vec3 f0 = mix(m.f0, m.kd, m.metallic);
     float specular = ggx_cos(f, l, v, h, m.roughness, m.anisotropy);
-    // Below 1e-12, |H|^2 is rounding error: l = -v, and there is no half vector.
+    // Below 1e-12, |H|^2 is only a rounding error: l is -v, and there is no half vector.
     bool lit = NoL > 0.0 && NoV > 0.0;
     return diffuse(m.kd * (1.0 - m.metallic), f0, LoH, lit ? NoL : 0.0) +
            f_schlick(f0, LoH) * (lit && H2 > 1e-12 ? specular : 0.0);

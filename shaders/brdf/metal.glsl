@@ -19,7 +19,7 @@ vec3 brdf_cos(Metal m, Frame f, vec3 l, vec3 v) {
     vec3 h = H / max(length_H, 1e-6);
     float LoH = cos_half(l, v, length_H);
     float specular = ggx_cos(f, l, v, h, m.roughness, m.anisotropy);
-    // Below 1e-12, |H|^2 is rounding error: l = -v, and there is no half vector.
+    // Below 1e-12, |H|^2 is only a rounding error: l is -v, and there is no half vector.
     bool lit = dot(f.n, l) > 0.0 && dot(f.n, v) > 0.0 && H2 > 1e-12;
     return fresnel(m.eta, m.k, LoH) * (lit ? specular : 0.0);
 }

@@ -17,7 +17,7 @@ vec3 brdf_cos(Plastic m, Frame f, vec3 l, vec3 v) {
     float NoL = dot(f.n, l);
     float NoV = dot(f.n, v);
     vec3 H = l + v;
-    // Below 1e-12, |H|^2 is rounding error: l = -v, and there is no half vector.
+    // Below 1e-12, |H|^2 is only a rounding error: l is -v, and there is no half vector.
     float H2 = dot(H, H);
     float inverse_H = inversesqrt(max(H2, 1e-12));
     float LoH = min(0.5 * H2 * inverse_H, 1.0);  // l.h = |H| / 2

@@ -22,7 +22,7 @@ vec3 brdf_cos(RetroGgx m, Frame f, vec3 l, vec3 v) {
     vec3 k = K / max(length_K, 1e-6);
     float RoK = cos_half(r, v, length_K);
     float specular = ggx_cos(f, r, v, k, m.roughness, 0.0);
-    // Below 1e-12, |K|^2 is rounding error: l = v lies in the surface, and there is no back vector.
+    // Below 1e-12, |K|^2 is only a rounding error: l is v and lies in the surface, and there is no back vector.
     bool lit = NoL > 0.0 && NoV > 0.0;
     return diffuse(m.kd, m.ks, lit ? NoL : 0.0, max(NoV, 0.0)) + f_schlick(m.ks, RoK) * (lit && K2 > 1e-12 ? specular : 0.0);
 }

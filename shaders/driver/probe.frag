@@ -1,5 +1,6 @@
 #include <version>
-// Pixel i of a row answers question i. The version is generated: 4.00 where the context has it, for fma and `precise`.
+// Pixel i of a row computes probe i. The GLSL version is generated: it is 4.00 if the context supports it, because `fma` and
+// `precise` need it.
 #include "driver/probe.glsl"
 
 out vec4 o_value;

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import os
 import sys
-import warnings
+from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import OpenImageIO as oiio
 import pytest
+from support.command import Result, run_command
 
 import glshade
 from glshade.image import file as picture_file
@@ -20,32 +21,13 @@ SCENE = '[[objects]]\nshape = "sphere"\n[film]\nsize = [24, 16]\n'
 BROKEN_DRIVER = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent"}
 
 
-class Result(NamedTuple):
-    code: int
-    out: str
-    err: str
-
-
 @pytest.fixture
 def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Any:
     """A function `run(*arguments)` that runs `glshade` in this process, in a folder that holds s.toml."""
     (tmp_path / "s.toml").write_text(SCENE)
     monkeypatch.chdir(tmp_path)
 
-    def run(*arguments: object) -> Result:
-        from glshade.cli import run as main
-
-        monkeypatch.setattr(sys, "argv", ["glshade", *map(str, arguments)])
-        # main() prints warnings to stderr, while pytest turns them into errors.
-        with warnings.catch_warnings():
-            warnings.simplefilter("default")
-            with pytest.raises(SystemExit) as exit:
-                main()
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return Result(int(exit.value.code or 0), out, err)
-
-    return run
+    return partial(run_command, capsys)
 
 
 def pictures(folder: Path) -> list[str]:

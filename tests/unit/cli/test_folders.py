@@ -6,14 +6,12 @@ import importlib.util
 import json
 import re
 import shutil
-import sys
-import warnings
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 import pytest
+from support.command import Result, run_command
 from support.folders import CHALK_GLSL, SCENE, VALUE, forget_models, lambert, write, write_models
 
 from glshade import BRDFS
@@ -23,12 +21,6 @@ from glshade.image.file import read
 # Each draws or explains its own: the plane is chalk, or Lambertian by the shader folder's file.
 PLAIN = SCENE.replace('brdf = "chalk", tint', 'brdf = "lambert", kd').replace("zenith", "directional")
 FOLDERS = ("--models", "models", "--shaders", "own")
-
-
-class Result(NamedTuple):
-    code: int
-    out: str
-    err: str
 
 
 Run = Callable[..., Result]
@@ -47,18 +39,9 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: object) -> Result:
-        from glshade.cli import run as main
-
-        with pytest.MonkeyPatch.context() as patch, warnings.catch_warnings():
+        with pytest.MonkeyPatch.context() as patch:
             forget_models(patch)
-            patch.setattr(sys, "argv", ["glshade", *map(str, arguments)])
-            # main() sends warnings to stderr; pytest would have them as errors.
-            warnings.simplefilter("default")
-            with pytest.raises(SystemExit) as exit:
-                main()
-        out, err = capsys.readouterr()
-        assert "Traceback" not in err
-        return Result(int(exit.value.code or 0), out, err)
+            return run_command(capsys, *arguments)
 
     return run
 
