@@ -6,6 +6,7 @@ values are allowed, and name the key or value with the most similar spelling.
 
 import difflib
 from collections.abc import Iterable, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -26,6 +27,9 @@ from pydantic import (
 )
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
+from glshade.files import check_regular
+from glshade.limits import MOST_FAULTS
+
 # pydantic puts these names of union branches in the path of an error. They are removed, since the author never wrote them.
 BRANCHES = frozenset({"<value>", "<texture-table>", "<shorthand>", "<table>"})
 
@@ -41,11 +45,19 @@ KINDS = {
 }
 
 
+# The length of a name that is compared with others, and the number of names that a message lists. A comparison takes time that
+# grows with the product of the two lengths.
+LONGEST_NAME, MOST_NAMES = 100, 100
+
+
 def nearest(name: object, names: Iterable[str]) -> str:
-    """Returns the end of a message: `; did you mean "x"?` where a name is spelled similarly, else the list of all names."""
+    """Returns the end of a message: `; did you mean "x"?` where a name is spelled similarly, else the list of names."""
     names = sorted(names)
-    close = difflib.get_close_matches(str(name), names, n=1)
-    return f'; did you mean "{close[0]}"?' if close else "; allowed: " + (", ".join(names) or "none")
+    listed = [known for known in names[:MOST_NAMES] if len(known) <= LONGEST_NAME]
+    close = difflib.get_close_matches(name, listed, n=1) if isinstance(name, str) and len(name) <= LONGEST_NAME else []
+    if close:
+        return f'; did you mean "{close[0]}"?'
+    return "; allowed: " + (", ".join(listed) or "none") + (", ..." if len(listed) < len(names) else "")
 
 
 def fault(message: str) -> PydanticCustomError:
@@ -56,8 +68,22 @@ def fault(message: str) -> PydanticCustomError:
 
 def received(value: object) -> str:
     """Returns the end of a message, such as `, not 3`; empty if the value is too long to be worth reading."""
-    text = repr(value)
+    text = written(value)
     return "" if len(text) > 40 else f", not {text}"
+
+
+def shortened(value: object) -> str:
+    """Returns the value as Python writes it, cut to 40 characters so that the message stays readable."""
+    text = written(value)
+    return text if len(text) <= 40 else f"{text[:36]} ..."
+
+
+def written(value: object) -> str:
+    """Returns the value as Python writes it, for a message."""
+    try:
+        return repr(value)
+    except ValueError:  # Python refuses to write a whole number of more than 4300 digits
+        return "a number of thousands of digits"
 
 
 def _message(error: Any, fields: Iterable[str]) -> str:
@@ -71,9 +97,9 @@ def _message(error: Any, fields: Iterable[str]) -> str:
     if kind == "too_long":
         return f"must be a list of {context['max_length']}, not of {context['actual_length']}"
     if kind == "literal_error":
-        return f"{given!r} is not one of {context['expected']}"
+        return f"{shortened(given)} is not one of {context['expected']}"
     if kind == "finite_number":
-        return f"{given!r} is not a finite number"
+        return f"{shortened(given)} is not a finite number"
     if kind in {"value_error", "assertion_error"}:
         return str(context.get("error", error["msg"]))
     if kind == "scene":
@@ -105,6 +131,7 @@ class Document(BaseModel):
     def _every_fault(cls, data: Any, handler: ModelWrapValidatorHandler[Any]) -> Any:
         """Returns the validated document. Errors: ValidationError with the faults of single keys and those between keys."""
         faults: list[InitErrorDetails] = []
+        mistyped: set[str | int] = set()
         document = None
         try:
             document = handler(data)
@@ -113,7 +140,11 @@ class Document(BaseModel):
             for detail in error.errors(include_url=False):
                 place = tuple(part for part in detail["loc"] if part not in BRANCHES)
                 faults.append(InitErrorDetails(type=fault(_message(detail, names)), loc=place, input=detail["input"]))
-        for loc, message in cls.cross_faults(data):
+                if len(place) == 1 and detail["type"].endswith("_type"):
+                    mistyped.add(place[0])
+        if mistyped:
+            data = {key: value for key, value in data.items() if key not in mistyped}
+        for loc, message in islice(cls.cross_faults(data), MOST_FAULTS):
             faults.append(InitErrorDetails(type=fault(message), loc=loc, input=data))
         if faults:
             raise ValidationError.from_exception_data(cls.__name__, faults)
@@ -123,7 +154,8 @@ class Document(BaseModel):
     def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
         """Returns the faults that concern several keys together, as pairs (key path, message).
 
-        They are looked for even where single keys have faults, so the values in `data` are not validated yet.
+        They are looked for even where single keys have faults, so the values in `data` are not validated yet. A key whose value
+        has the wrong type is left out; a list or table of the right type may have faults inside.
         """
         return ()
 
@@ -153,7 +185,7 @@ class Chosen:
         if name is None:
             raise fault(f"lacks the key {self.key!r}" + nearest("", self.models))
         if not isinstance(name, str) or name not in self.models:
-            unknown = fault(f"unknown {self.key} {name!r}" + nearest(name, self.models))
+            unknown = fault(f"unknown {self.key} {shortened(name)}" + nearest(name, self.models))
             place = InitErrorDetails(type=unknown, loc=(self.key,), input=name)
             raise ValidationError.from_exception_data(self.key, [place])
         return self.models[name].model_validate({**data, self.key: name}, context=info.context)
@@ -197,12 +229,18 @@ def _triple(value: Any) -> Any:
 def resolved(path: Path, info: ValidationInfo) -> Path:
     """Returns the path of a file, taken relative to the folder of the scene file; refuses a path where there is no file."""
     folder = (info.context or {}).get("folder")
-    path = path.expanduser()
-    path = path if path.is_absolute() or folder is None else Path(folder) / path
-    if not path.exists():
-        raise fault(f"{path} does not exist")
-    if path.is_dir():
-        raise fault(f"{path} is a folder, not a file")
+    try:
+        path = path.expanduser()
+        path = path if path.is_absolute() or folder is None else Path(folder) / path
+        check_regular(path)
+    except (FileNotFoundError, NotADirectoryError):
+        raise fault(f"{path} does not exist") from None
+    except IsADirectoryError:
+        raise fault(f"{path} is a folder, not a file") from None
+    except OSError as error:
+        raise fault(f"{path} cannot be read: {error.strerror}") from None
+    except (RuntimeError, ValueError) as error:  # an unknown home folder, or a name that no file can have
+        raise fault(f"{path} is no name of a file: {error}") from None
     return path
 
 

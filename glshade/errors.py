@@ -6,7 +6,41 @@ wrong and what to do. The table of exit codes is in docs/exit-codes.md.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
+
+# The length of a line of a message that concerns a scene [characters].
+LONGEST_LINE = 1000
+# Characters that a terminal obeys or that end a line: control characters, line separators, changes of the direction of
+# writing, and halves of surrogate pairs, which cannot be written as UTF-8.
+_UNPRINTABLE = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+def printable(text: str) -> str:
+    """Returns a text as one line that is safe to print: `\\u001b` stands for an escape character, and so on.
+
+    File names and the names in files come from strangers. Printed as they are, they could forge a line or take over a terminal.
+    """
+    return _UNPRINTABLE.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
+
+
+def is_printable(text: str) -> bool:
+    """Returns whether `printable` leaves a text as it is."""
+    return _UNPRINTABLE.search(text) is None
+
+
+def figure(number: float) -> str:
+    """Returns a number as text for a message: with six digits, or with as many as it takes to write it exactly.
+
+    A value just outside a limit, rounded to six digits, would read like the limit itself.
+    """
+    short = f"{number:g}"
+    return short if float(short) == number else str(number)
+
+
+def shortened(line: str) -> str:
+    """Returns a line of a message without its middle if it is so long that nobody would read it."""
+    return line if len(line) <= LONGEST_LINE else f"{line[: LONGEST_LINE - 300]} ... {line[-290:]}"
 
 
 class GlshadeError(Exception):
@@ -33,7 +67,7 @@ class SceneError(GlshadeError):
     exit_code = 3
 
     def __init__(self, problems: str | Sequence[str]) -> None:
-        self.problems = (problems,) if isinstance(problems, str) else tuple(problems)
+        self.problems = tuple(shortened(printable(x)) for x in ((problems,) if isinstance(problems, str) else problems))
         super().__init__("\n".join(self.problems))
 
 

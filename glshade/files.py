@@ -1,8 +1,10 @@
-"""Files: writes files completely or not at all, and keeps the user's cache folder."""
+"""Files: reads regular files, writes files completely or not at all, and keeps the user's cache folder."""
 
 from __future__ import annotations
 
+import errno
 import os
+import stat
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -16,6 +18,38 @@ LIMIT = 512 << 20
 YOUNG = 60.0
 
 
+def check_regular(path: str | Path) -> None:
+    """Checks that a path leads to a regular file.
+
+    Opening a FIFO would wait for ever, and /dev/zero has no end. Errors: OSError, with the reason in `strerror`.
+    """
+    _check_mode(os.stat(path).st_mode)
+
+
+def read_bytes(path: str | Path, largest: int) -> bytes:
+    """Returns the bytes of a regular file.
+
+    largest: the size above which the file is refused [bytes].
+    Errors: OSError, with the reason in `strerror`.
+    """
+    # O_NONBLOCK opens a FIFO without waiting for its writer. The file is checked after it is open, so that no other file can
+    # take its place in between.
+    with open(os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK), "rb") as file:
+        _check_mode(os.fstat(file.fileno()).st_mode)
+        data = file.read(largest + 1) if os.fstat(file.fileno()).st_size <= largest else None
+    if data is None or len(data) > largest:
+        raise OSError(errno.EFBIG, f"is larger than {largest:,} bytes, the most that is read")
+    return data
+
+
+def _check_mode(mode: int) -> None:
+    """Checks the mode of a file. Errors: OSError."""
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, "is a folder, not a file")
+    if not stat.S_ISREG(mode):
+        raise OSError(errno.EINVAL, "is not a regular file")
+
+
 def beside(path: Path, process: int) -> Path:
     """Returns the temporary file beside `path` to which the process with this id writes before it replaces `path`."""
     return path.with_name(f".{path.stem}.{process}{path.suffix}")
@@ -25,14 +59,27 @@ def beside(path: Path, process: int) -> Path:
 def replacing(path: Path) -> Iterator[Path]:
     """Yields a temporary file to write to. The file replaces `path` when the block ends, and is deleted when the block raises.
 
-    Errors: OSError.
+    After a power failure `path` is the old file or the new one, both complete. Errors: OSError.
     """
     written = beside(path, os.getpid())
     try:
         yield written
+        _flush(written, os.O_RDWR)
         os.replace(written, path)
     finally:
         written.unlink(missing_ok=True)
+    # Until the folder is on the disk, a power failure may undo the renaming. Only POSIX systems can open a folder.
+    with suppress(OSError):
+        _flush(path.parent, os.O_RDONLY)
+
+
+def _flush(path: Path, flags: int) -> None:
+    """Waits until a file or a folder is on the disk. flags: how to open it. Errors: OSError."""
+    file = os.open(path, flags)
+    try:
+        os.fsync(file)
+    finally:
+        os.close(file)
 
 
 class Cache:

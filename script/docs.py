@@ -46,6 +46,9 @@ scene file's folder. Unknown keys are errors, and so are numbers that are not fi
 A colour is three numbers, linear Rec. 709. One number stands for three equal ones. In the column "default", "required" means
 that the key must be given, and "-" that it is optional; its meaning says what happens without it.
 
+[From a scene to its picture](from-scene-to-picture.md) gives the rules that are too long for a table: vertices and texture
+coordinates of the shapes, smooth normals, tangents, filtering of textures, and the sum of all light.
+
 TOML has two ways to write a list of tables: `[[objects]]` with the keys below it, or `objects = [ { ... }, { ... } ]`, which
 must stand above the first `[table]`.
 """

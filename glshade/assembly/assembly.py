@@ -6,7 +6,7 @@ Both renderers start from an Assembly. Its meshes are float32; everything else i
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -17,15 +17,16 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
+from glshade.assembly.counting import check_counts, check_texels
 from glshade.assembly.default_rig import rig
 from glshade.assembly.instance import Instance
 from glshade.brdfs import BRDFS, Brdf
 from glshade.errors import SceneError
 from glshade.lights import Light
-from glshade.mesh import file as mesh_file
+from glshade.limits import LARGEST_NUMBER, SMALLEST_NUMBER
 from glshade.mesh.facets import faceted
 from glshade.mesh.mesh import Mesh
-from glshade.mesh.model import MeshPart
+from glshade.mesh.model import MeshPart, Model
 from glshade.mesh.normals import with_normals
 from glshade.mesh.order import ordered
 from glshade.mesh.tangents import with_tangents
@@ -101,7 +102,8 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
     shading: optional, the shading rate of all objects in place of their own.
     Errors: SceneError (AssetError) with all faults of meshes, materials and missing texture coordinates.
     """
-    pieces = _pieces(scene)
+    pieces = _pieces(scene, shading)
+    check_texels((piece.material for piece in pieces), scene.limits)
     view = _view(scene, pieces)
     lights = scene.lights if scene.lights is not None else rig(view)
     instances = tuple(_instance(scene, piece, view, lights, shading) for piece in pieces)
@@ -113,14 +115,23 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
     return _in_range(Assembly(instances, tuple(lights), view), np.concatenate([piece.box for piece in pieces]))
 
 
-def _pieces(scene: Scene) -> list[_Piece]:
-    """Returns the meshes of all objects. Errors: SceneError with the faults of all mesh files and their materials."""
+def _pieces(scene: Scene, shading: Rate | None) -> list[_Piece]:
+    """Returns the meshes of all objects. shading: as in `assemble`.
+
+    Errors: SceneError with the faults of all mesh files and their materials, or where the scene exceeds a limit.
+    """
     pieces: list[_Piece] = []
     problems: list[str] = []
     by_name = {item.name: item for item in scene.objects}
+    load = scene.loader()
+    check_counts(scene, load, shading)
     for number, item in enumerate(scene.objects):
+        world = _world(by_name, item)
+        if not _is_in_range(world):
+            problems.append(f"objects[{number}].transform: together with the parents' it is too large or too small")
+            continue
         try:
-            pieces.extend(_pieces_of(scene, by_name, number, item))
+            pieces.extend(_pieces_of(scene, load, number, item, world))
         except SceneError as error:
             problems.extend(f"objects[{number}].mesh: {problem}" for problem in error.problems)
     if problems:
@@ -145,7 +156,7 @@ def _instance(scene: Scene, piece: _Piece, view: View, lights: tuple[Light, ...]
         if (light.only is None or item.name in light.only) and light.intensity != 0 and any(light.colour)
     )
     ambient = any(lights[i].omnidirectional for i in chosen)
-    quality = item.quality.over(scene.quality) if item.quality else scene.quality
+    quality = scene.quality_of(item)
     material = quality.material(piece.material).canonical(ambient)
     rate = shading or quality.shading or item.shading
     tangents = material.needs_tangents or material.normal_map is not None or material.bump_map is not None
@@ -197,18 +208,19 @@ def _in_range(assembly: Assembly, corners: Array) -> Assembly:
     )
 
 
-def _pieces_of(scene: Scene, by_name: dict[str | None, Object], number: int, item: Object) -> Iterator[_Piece]:
+def _pieces_of(scene: Scene, load: Callable[[Path], Model], number: int, item: Object, world: Array) -> Iterator[_Piece]:
     """Yields the meshes of one object: one for each part of its mesh file, or the only one. Errors: SceneError.
 
-    by_name: the scene's objects by name.
+    load: the function that loads mesh files.
     number: index of the object in the scene.
     item: the object.
+    world: transform (4, 4) from the object to world space.
     """
-    name, world = item.name or f"objects[{number}]", _world(by_name, item)
+    name = item.name or f"objects[{number}]"
     own = scene.materials[item.material] if isinstance(item.material, str) else item.material
     own_name = item.material if isinstance(item.material, str) else name if own else DEFAULT_NAME
     if isinstance(item.mesh, Path):
-        model = mesh_file.load(item.mesh)
+        model = load(item.mesh)
         # Parts with equal materials share the name of the first such part.
         first: dict[str, str] = {repr(None): DEFAULT_NAME}
         for part in model.parts:
@@ -246,12 +258,19 @@ def _file_material(part: MeshPart, path: Path) -> Brdf:
 
 
 def _world(by_name: dict[str | None, Object], item: Object) -> Array:
-    """Returns the transform (4, 4) from an object to world space, through all its parents."""
+    """Returns the transform (4, 4) from an object to world space, through all its parents. Its numbers may be infinite or NaN."""
     world = item.transform.array()
-    while item.parent is not None:
-        item = by_name[item.parent]
-        world = item.transform.array() @ world
+    with np.errstate(all="ignore"):
+        while item.parent is not None:
+            item = by_name[item.parent]
+            world = item.transform.array() @ world
     return world
+
+
+def _is_in_range(world: Array) -> bool:
+    """Whether the numbers of a transform (4, 4) are in the range whose squares and cubes fit into float64; NaN is not."""
+    sizes = np.abs(world[:3, :3]).max(axis=0)
+    return bool(np.abs(world).max() <= LARGEST_NUMBER and sizes.min() >= SMALLEST_NUMBER)
 
 
 def _placed(points: Array, world: Array) -> Array:

@@ -2,7 +2,7 @@
 
 A dask task is a parcel of pictures. If the worker of a parcel dies, the scheduler runs the parcel again on another worker
 without asking. So every picture is sent with the time at which its file was last written. If the file is newer when the parcel
-runs, the digest in the file decides whether the picture has to be drawn again.
+runs, the picture is drawn again, and written again only if the file holds other bytes.
 """
 
 from __future__ import annotations
@@ -409,7 +409,9 @@ def _started(devices: Sequence[int | None], hardware: bool, shares: bool) -> dis
     free = {"port": 0, "dashboard_address": f"{host}:0"}
     options = {"host": host, **free, "dashboard": False, "allowed_failures": 0}
     quiet = {"distributed.nanny.pre-spawn-environ.DASK_LOGGING__DISTRIBUTED": "critical"}
-    with dask.config.set({"distributed.scheduler.worker-ttl": None, **quiet}):
+    # Without routes, the HTTP servers have no pages: `"dashboard": False` alone would leave pages with the tasks' arguments.
+    unseen: dict[str, Any] = {"distributed.scheduler.http.routes": [], "distributed.worker.http.routes": []}
+    with dask.config.set({"distributed.scheduler.worker-ttl": None, **quiet, **unseen}):
         try:
             return SpecCluster(workers=workers, scheduler={"cls": Scheduler, "options": options})
         except (OSError, RuntimeError) as error:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
@@ -15,6 +16,8 @@ MOST = 10_000_000
 PLACE = re.compile(r"#+|\{(.*?)\}")
 # Characters of a sweep's key or value that are replaced in a file name.
 UNNAMED = re.compile(r"[^\w.+-]+")
+# Texts that would lead to another folder: separators anywhere in a name, and a name of dots alone.
+LEADING_OUT = re.compile(r"[/\\\0]|^\.+$")
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,16 @@ def parse_sweep(text: str) -> Sweep:
     return Sweep(key, values)
 
 
+def check_count(scenes: int, cameras: int, frames: int, sweeps: Sequence[Sweep], most: int) -> None:
+    """Checks the number of pictures of a batch, before they are listed. Errors: ValueError for more than `most`.
+
+    scenes, cameras, frames: their numbers; no camera counts as one
+    """
+    count = math.prod([scenes, cameras or 1, frames, *(len(sweep.values) for sweep in sweeps)])
+    if count > most:
+        raise ValueError(f"the scenes, cameras, frames and swept values give {count:,} pictures; {most:,} are allowed")
+
+
 def _split(text: str) -> Iterator[str]:
     """Yields the parts of a text between the commas that are outside of brackets and quotes."""
     depth, quote, start = 0, "", 0
@@ -123,10 +136,10 @@ def pictures(
         for values in product(*(sweep.values for sweep in sweeps)):
             overrides = tuple((sweep.key, value) for sweep, value in zip(sweeps, values, strict=True))
             words = {sweep.short: value for sweep, value in zip(sweeps, values, strict=True)} | dict(overrides)
-            words = {key: UNNAMED.sub("_", value).strip("_") for key, value in words.items()}
+            words = {key: _inside(UNNAMED.sub("_", value).strip("_")) for key, value in words.items()}
             for camera in cameras or (None,):
                 # The names of scene and camera win over a sweep whose key ends in "scene" or "camera".
-                parts = words | {"scene": scene.stem, "camera": camera or "camera"}
+                parts = words | {"scene": _inside(scene.stem), "camera": _inside(camera or "camera")}
                 for frame in frames or (None,):
                     output = Path(_named(pattern, parts, frame))
                     if output in outputs:
@@ -174,6 +187,11 @@ def _named(pattern: str, words: Mapping[str, str], frame: int | None) -> str:
         return f"{sign}{abs(frame):0{len(place[0])}d}"
 
     return PLACE.sub(fill, pattern)
+
+
+def _inside(name: str) -> str:
+    """Returns a name from a scene file or an option as a part of a file name, which cannot lead to another folder."""
+    return LEADING_OUT.sub("_", name)
 
 
 def _missing_place(pattern: str, sweeps: Sequence[Sweep], cameras: Sequence[str], frames: Sequence[int] | None) -> str:

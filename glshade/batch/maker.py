@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import filecmp
 import hashlib
 import warnings
 from collections import OrderedDict
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryFile
+from tempfile import TemporaryDirectory, TemporaryFile
 from time import perf_counter, time
 from typing import TYPE_CHECKING, Any, cast
 
@@ -19,6 +21,7 @@ from glshade.batch.task import Task
 from glshade.errors import GlshadeError, SceneError
 from glshade.image.file import format_of
 from glshade.image.image import Image
+from glshade.limits import Limits
 from glshade.scene.file import SceneFile
 from glshade.scene.film import Film
 from glshade.scene.models import Folders, paths, use_models
@@ -115,12 +118,17 @@ class Maker:
         driver = "float64 reference" if task.reference else self.driver
         name = picture_digest(scene, task, driver, self.code)
         record = Record(task.number, task.output, "done", name, driver=driver, device=self.device)
-        if task.resume and all(digest_of(file) == name for file in _files(task, scene)):
-            return replace(record, state="skipped", **_contents(task.output))
+        files = _files(task, scene)
+        if task.resume and task.known[:1] == (name,):
+            kept = replace(record, state="skipped", **_contents(files))
+            if kept.known == task.known:
+                return kept
         loaded, started = perf_counter(), time()
         picture = self._picture(task, scene)
         seconds = {"load": loaded - start, "draw": perf_counter() - loaded}
-        return Drawn(picture, replace(record, seconds=seconds, started=started))
+        # The digest in a file's header says nothing about the rest of the file. So the file is compared with the new picture.
+        compared = task.resume and all(digest_of(file) == name for file in files)
+        return Drawn(picture, files, replace(record, seconds=seconds, started=started), compared)
 
     def _picture(self, task: Task, scene: Scene) -> Image | Layers:
         linear = format_of(task.output).floats
@@ -139,8 +147,8 @@ class Maker:
 
     def scene(self, task: Task) -> Scene:
         """Returns the scene that a task draws. Errors: SceneError."""
-        key = task.scene, task.overrides
-        file = self._files.pop(key, None) or SceneFile(task.scene, task.overrides)
+        key = task.scene, task.overrides, tuple(task.limits.items())
+        file = self._files.pop(key, None) or SceneFile(task.scene, task.overrides, Limits(**task.limits))
         self._files[key] = file
         if len(self._files) > KEPT_FILES:
             self._files.popitem(last=False)
@@ -156,12 +164,16 @@ class Drawn:
     """A picture that is drawn and not yet written.
 
     picture: the pixels, with layers if the film asks for them
+    files: the picture's file and, if there is one, the separate file of its layers
     record: the record of the picture, complete except for the fields about the file
+    compared: True if files that hold the same bytes already are left alone; the record then says "skipped"
     warnings: messages of the warnings raised while it was drawn
     """
 
     picture: Image | Layers
+    files: list[Path]
     record: Record
+    compared: bool = False
     warnings: tuple[str, ...] = ()
 
     def write(self) -> Record:
@@ -170,8 +182,10 @@ class Drawn:
         start = perf_counter()
         path = Path(record.output)
         try:
+            if self.compared and self._is_there():
+                return replace(record, state="skipped", **_contents(self.files))
             self.picture.save(path, {ATTRIBUTE: record.digest})
-            contents = _contents(path)
+            contents = _contents(self.files)
         except FAULTS as error:
             fault = _fault_of_folder(path, self._size)
             # If the disk is full, the operating system's message is clearer than that of the library that writes the format.
@@ -179,6 +193,16 @@ class Drawn:
             code = getattr(error, "exit_code", 1)
             return replace(record, state="failed", error=message, exit_code=code, stops=bool(fault))
         return replace(record, seconds={**record.seconds, "write": perf_counter() - start}, finished=time(), **contents)
+
+    def _is_there(self) -> bool:
+        """Returns whether the files hold the bytes that `save` would write; False where there is no room for a copy."""
+        try:
+            with TemporaryDirectory() as folder:
+                copies = [Path(folder) / file.name for file in self.files]
+                self.picture.save(copies[0], {ATTRIBUTE: self.record.digest})
+                return all(filecmp.cmp(file, copy, shallow=False) for file, copy in zip(self.files, copies, strict=True))
+        except (GlshadeError, OSError):
+            return False
 
     @property
     def _size(self) -> int:
@@ -224,10 +248,14 @@ def _failed(task: Task, error: BaseException) -> Record:
     return Record(task.number, task.output, "failed", error=message, exit_code=getattr(error, "exit_code", 1))
 
 
-def _contents(path: str | Path) -> dict[str, Any]:
-    """Returns a file's hash and size, as fields of a Record."""
-    data = Path(path).read_bytes()
-    return {"sha256": hashlib.sha256(data).hexdigest(), "size": len(data)}
+def _contents(files: Sequence[Path]) -> dict[str, Any]:
+    """Returns the size of a picture's file and the hashes of all its files, as fields of a Record.
+
+    The hash of a missing file is "".
+    """
+    hashes = [hashlib.sha256(file.read_bytes()).hexdigest() if file.is_file() else "" for file in files]
+    size = files[0].stat().st_size if hashes[0] else 0
+    return {"sha256": hashes[0], "size": size, "layers_sha256": "".join(hashes[1:])}
 
 
 def _fault_of_folder(path: Path, size: int) -> str:

@@ -13,30 +13,49 @@ from glshade.batch.record import Record
 from glshade.batch.task import Task, without_empty
 from glshade.errors import GlshadeError
 
+# Every line begins with this, so an incomplete first line can be told from the text of another file.
+BEGINNING = b'{"output": '
+
+
+class NoManifest(GlshadeError):
+    """The file is not a manifest, so no line may be added to it or removed from it."""
+
+    exit_code = 2
+
 
 class Manifest:
     """The log file, open for appending. This class is a context manager.
 
-    Errors: GlshadeError if the file cannot be read or written.
+    Errors: GlshadeError if the file cannot be read or written; NoManifest if it holds something else than a manifest.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
         self._folder = path.resolve().parent
-        # Output path -> (digest, SHA-256 of the file), for pictures that are done according to their last line.
-        self._done: dict[str, tuple[str, str]] = {}
+        # Output path -> `Task.known`, for pictures that are done according to their last line.
+        self._done: dict[str, tuple[str, ...]] = {}
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_CLOEXEC", 0), 0o666)
+        except OSError as error:
+            raise self._fault(error) from None
+        try:
             if stat.S_ISREG(os.fstat(self._file).st_mode):
                 self._read()
-        except OSError as error:
-            raise GlshadeError(f"{path}: cannot be written: {error.strerror}") from None
+        except BaseException as error:
+            os.close(self._file)
+            if isinstance(error, OSError):
+                raise self._fault(error) from None
+            raise
 
     def __enter__(self) -> Manifest:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
         os.close(self._file)
+
+    def known(self, output: str) -> tuple[str, ...]:
+        """Returns the `Task.known` of a picture; empty if its last line does not say that it is done, or if it has no line."""
+        return self._done.get(self._relative(output), ())
 
     def add(self, task: Task, record: Record) -> None:
         """Appends a line for the record.
@@ -45,41 +64,55 @@ class Manifest:
         before it wrote the line; the line is then written now.
         Errors: GlshadeError if the line cannot be written, as on a full disk.
         """
-        output = os.path.relpath(os.path.abspath(record.output), self._folder)
-        known = not record.digest or self._done.get(output) == (record.digest, record.sha256)
-        if record.state == "skipped" and known:
+        if record.state == "skipped" and (not record.digest or self.known(record.output) == record.known):
             return
-        line: dict[str, Any] = {"output": output, "state": "failed" if record.state == "failed" else "done"}
+        line: dict[str, Any] = {
+            "output": self._relative(record.output),
+            "state": "failed" if record.state == "failed" else "done",
+        }
         line |= {"scene": task.scene, "frame": task.frame, "camera": task.camera, "overrides": dict(task.overrides)}
         line |= {key: value for key, value in record.as_dict().items() if key not in ("number", "output", "state", "stops")}
         data = json.dumps(without_empty(line)).encode() + b"\n"
         try:
             written = os.write(self._file, data)
         except OSError as error:
-            raise GlshadeError(f"{self.path}: cannot be written: {error.strerror}") from None
+            raise self._fault(error) from None
         if written < len(data):
             raise GlshadeError(f"{self.path}: cannot be written whole: is the disk full?")
         self._note(line)
 
+    def _relative(self, output: str) -> str:
+        """Returns the path of a picture, relative to the manifest's folder."""
+        return os.path.relpath(os.path.abspath(output), self._folder)
+
     def _read(self) -> None:
-        """Collects the finished pictures, and cuts off an incomplete last line that a killed process left."""
+        """Collects the finished pictures, and cuts off an incomplete last line that a killed process left.
+
+        Errors: NoManifest.
+        """
         whole = 0
         with open(self._file, "rb", closefd=False) as file:
             for data in file:
+                if whole == 0 and data[: len(BEGINNING)] != BEGINNING[: len(data)]:
+                    raise NoManifest(f"{self.path}: is not a manifest, and is left as it is: name another file")
                 if not data.endswith(b"\n"):
                     os.ftruncate(self._file, whole)
                     return
                 whole += len(data)
                 try:
                     line = json.loads(data)
-                except ValueError:
+                except (ValueError, RecursionError):
                     continue
                 if isinstance(line, dict):
                     self._note(line)
 
     def _note(self, line: dict[str, Any]) -> None:
-        output = line.get("output")
+        output = str(line.get("output"))
         if line.get("state") == "done":
-            self._done[str(output)] = str(line.get("digest")), str(line.get("sha256"))
+            texts = (line.get(key) for key in ("digest", "sha256", "layers_sha256"))
+            self._done[output] = tuple(text for text in texts if isinstance(text, str) and text)
         else:
-            self._done.pop(str(output), None)
+            self._done.pop(output, None)
+
+    def _fault(self, error: OSError) -> GlshadeError:
+        return GlshadeError(f"{self.path}: cannot be written: {error.strerror}")

@@ -85,10 +85,7 @@ def _make_on_this_thread(orders: Sequence[tuple[dict[str, Any], int]], condition
                 drawn: Drawn | Record = maker.draw(replace(task, resume=task.resume or time_written(task.output) != written))
             except Exception as error:
                 drawn = fault(task.number, task.output, error)
-            if isinstance(drawn, Record) and drawn.state == "skipped" and not task.resume:
-                # The worker that made the picture died before it could report the picture.
-                drawn = replace(drawn, state="done")
-            records.append(writers.submit(_write, drawn))
+            records.append(writers.submit(_write, drawn, task.resume))
     results = [record.result().as_dict() for record in records]
     return {"driver": driver, "seconds": perf_counter() - start, "records": results}
 
@@ -128,13 +125,16 @@ def _driver_for(conditions: Conditions, maker: Maker, host: str) -> str:
     return driver
 
 
-def _write(drawn: Drawn | Record) -> Record:
+def _write(drawn: Drawn | Record, resume: bool) -> Record:
+    """Writes a picture if there is one to write, and returns its record. resume: Task.resume."""
     if isinstance(drawn, Record):
         return drawn
     try:
-        return drawn.write()
+        record = drawn.write()
     except Exception as error:
         return fault(drawn.record.number, drawn.record.output, error)
+    # Without Task.resume, a picture is there already only if the worker that made it died before it could report it.
+    return replace(record, state="done") if record.state == "skipped" and not resume else record
 
 
 def forget() -> None:

@@ -31,6 +31,7 @@ class Record:
     exit_code: exit code that belongs to the failure, as docs/exit-codes.md lists them
     stops: True if the next pictures would fail for the same reason, such as a full disk or a folder without write permission
     warnings: messages of the warnings raised while the picture was made
+    layers_sha256: SHA-256 of the separate file of layers; "" if the picture has none
     """
 
     number: int
@@ -49,6 +50,12 @@ class Record:
     exit_code: int = 0
     stops: bool = False
     warnings: tuple[str, ...] = ()
+    layers_sha256: str = ""
+
+    @property
+    def known(self) -> tuple[str, ...]:
+        """The digest and the SHA-256 of each file, in the form of `Task.known`."""
+        return tuple(filter(None, (self.digest, self.sha256, self.layers_sha256)))
 
     def as_dict(self) -> dict[str, Any]:
         """Returns the fields as JSON types, without empty values."""

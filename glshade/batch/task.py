@@ -19,11 +19,13 @@ class Task:
     frame: frame number of the animation; None draws the scene without animation
     camera: name of one of the scene's `cameras`; None selects the scene's main camera
     film: keys of the film with the values that replace the scene's
+    limits: fields of Limits with the values that replace the defaults
     shading: "flat", "gouraud" or "phong" for the whole picture; None keeps each object's own
     reference: True draws with the float64 reference
     tile: largest side of a region that is drawn in one piece [pixels]; None leaves it to the renderer
     settings: `Setting.as_dict` of each object, as --budget or --deadline chose them; None keeps the scene's settings
-    resume: True leaves the output file alone if it already holds this picture, which the digest in the file shows
+    resume: True leaves the output file alone if it already holds this picture
+    known: digest of the picture and SHA-256 of each of its files, as the manifest records them; empty if it has no record
     """
 
     number: int
@@ -33,11 +35,13 @@ class Task:
     frame: int | None = None
     camera: str | None = None
     film: Mapping[str, Any] = field(default_factory=dict)
+    limits: Mapping[str, Any] = field(default_factory=dict)
     shading: str | None = None
     reference: bool = False
     tile: int | None = None
     settings: tuple[Mapping[str, Any], ...] | None = None
     resume: bool = False
+    known: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Returns the fields as JSON types, without empty values."""
@@ -48,7 +52,8 @@ class Task:
         """Returns the task whose `as_dict` gave the data. The data may have been written to JSON and read back."""
         settings = data.get("settings")
         overrides = tuple((key, text) for key, text in data.get("overrides", ()))
-        return cls(**{**data, "overrides": overrides, "settings": settings and tuple(settings)})
+        known = tuple(data.get("known", ()))
+        return cls(**{**data, "overrides": overrides, "settings": settings and tuple(settings), "known": known})
 
     def absolute(self) -> Task:
         """Returns the task with absolute paths, for a process that has another working directory."""

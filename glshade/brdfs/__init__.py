@@ -20,6 +20,7 @@ from pydantic_core import CoreSchema
 
 from glshade.arrays import rounded
 from glshade.document import Document, Finite, Triple, fault
+from glshade.errors import figure
 from glshade.found import Found
 from glshade.textures.texture import BumpMap, DirectionMap, NormalMap, Picture, Texture
 
@@ -263,9 +264,9 @@ class Brdf(Document):
             return value
         numbers = value if isinstance(value, tuple) else (value,)
         if min(numbers) < declared.low:
-            raise fault(f"must be at least {declared.low:g}, not {min(numbers):g}")
+            raise fault(f"must be at least {declared.low:g}, not {figure(min(numbers))}")
         if declared.high is not None and max(numbers) > declared.high:
-            raise fault(f"must be at most {declared.high:g}, not {max(numbers):g}")
+            raise fault(f"must be at most {declared.high:g}, not {figure(max(numbers))}")
         return value
 
     def canonical(self, ambient: bool) -> "Brdf":

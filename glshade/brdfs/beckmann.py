@@ -30,12 +30,15 @@ class Beckmann(Brdf):
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("diffuse reflectance", high=1.0, base=True))
     eta: Colour = parameter((1.5, 1.5, 1.5), Parameter("index of refraction", low=0.01, high=100.0, usual=(1.1, 4.0)))
     k: Colour = parameter((0.0, 0.0, 0.0), Parameter("extinction", high=100.0, usual=(0.0, 8.0)))
-    roughness: Scalar = parameter(0.5, Parameter("square root of alpha, the spread of the slopes", high=1.0, usual=(0.2, 1.0)))
+    roughness: Scalar = parameter(
+        0.5,
+        Parameter("square root of alpha, the spread of the slopes; below 0.01 it counts as 0.01", high=1.0, usual=(0.2, 1.0)),
+    )
     geometry: Literal["smith", "v_groove"] = choice(
         "smith", "shadowing: Smith's, height-correlated; or V-shaped grooves (1982)"
     )
     fresnel: Literal["exact", "schlick"] = choice(
-        "exact", "exact, or Schlick's approximation; its error is 0.036 for glass and up to 0.23 for metals"
+        "exact", "exact, or Schlick's approximation; its error is 0.036 for glass, up to 0.255 within the usual ranges"
     )
 
     @classmethod

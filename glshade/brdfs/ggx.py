@@ -40,8 +40,16 @@ class Ggx(Brdf):
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("base colour", high=1.0, base=True))
     f0: Colour = parameter((0.04, 0.04, 0.04), Parameter("a dielectric's reflectance at normal incidence", high=1.0))
     metallic: Scalar = parameter(0.0, Parameter("0: dielectric, 1: metal", high=1.0))
-    roughness: Scalar = parameter(0.5, Parameter("square root of alpha, the width of the lobe", high=1.0, usual=(0.1, 1.0)))
-    anisotropy: Scalar = parameter(0.0, Parameter("how far highlights are stretched along the tangent", high=1.0))
+    roughness: Scalar = parameter(
+        0.5, Parameter("square root of alpha, the width of the lobe; below 0.01 it counts as 0.01", high=1.0, usual=(0.1, 1.0))
+    )
+    anisotropy: Scalar = parameter(
+        0.0,
+        Parameter(
+            "stretches highlights along the tangent: alpha_x = alpha / s, alpha_y = alpha s, s = sqrt(1 - 0.9 anisotropy)",
+            high=1.0,
+        ),
+    )
     lobes: Literal["all", "specular"] = choice("all", "all, or specular: without the diffuse lobe")
 
     @classmethod

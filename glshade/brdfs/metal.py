@@ -35,10 +35,18 @@ class Metal(Brdf):
         (0.1239, 0.3805, 1.541), Parameter("index of refraction; default: gold", low=0.01, high=100.0, usual=(0.1, 4.0))
     )
     k: Colour = parameter((4.834, 2.196, 1.676), Parameter("extinction; default: gold", high=100.0, usual=(1.0, 8.0)))
-    roughness: Scalar = parameter(0.3, Parameter("square root of alpha, the width of the lobe", high=1.0, usual=(0.1, 1.0)))
-    anisotropy: Scalar = parameter(0.0, Parameter("how far highlights are stretched along the tangent", high=1.0))
+    roughness: Scalar = parameter(
+        0.3, Parameter("square root of alpha, the width of the lobe; below 0.01 it counts as 0.01", high=1.0, usual=(0.1, 1.0))
+    )
+    anisotropy: Scalar = parameter(
+        0.0,
+        Parameter(
+            "stretches highlights along the tangent: alpha_x = alpha / s, alpha_y = alpha s, s = sqrt(1 - 0.9 anisotropy)",
+            high=1.0,
+        ),
+    )
     fresnel: Literal["exact", "schlick"] = choice(
-        "exact", "exact, or Schlick's approximation; its error is up to 0.23 for metals"
+        "exact", "exact, or Schlick's approximation; its error is up to 0.255 within the usual ranges"
     )
 
     @property

@@ -39,10 +39,14 @@ class Paint(Brdf):
     kd: Colour = parameter((0.5, 0.05, 0.05), Parameter("diffuse reflectance of the pigment", high=1.0, base=True))
     flake_colour: Colour = parameter((0.9, 0.9, 0.9), Parameter("reflectance of the flakes at normal incidence", high=1.0))
     flakes: Scalar = parameter(0.3, Parameter("share of flakes; the rest is pigment", high=1.0))
-    flake_roughness: Scalar = parameter(0.5, Parameter("roughness of the layer of flakes, the square root of alpha", high=1.0))
+    flake_roughness: Scalar = parameter(
+        0.5, Parameter("roughness of the layer of flakes, the square root of alpha; below 0.01 it counts as 0.01", high=1.0)
+    )
     coat: Scalar = parameter(1.0, Parameter("share of the surface that has a coat", high=1.0))
     ior: Scalar = parameter(1.5, Parameter("index of refraction of the coat", low=1.0, high=3.0, usual=(1.0, 2.5)))
-    coat_roughness: Scalar = parameter(0.1, Parameter("roughness of the coat, the square root of alpha", high=1.0))
+    coat_roughness: Scalar = parameter(
+        0.1, Parameter("roughness of the coat, the square root of alpha; below 0.01 it counts as 0.01", high=1.0)
+    )
 
     @classmethod
     def limits(cls) -> tuple[Limit, ...]:

@@ -40,7 +40,9 @@ class Plastic(Brdf):
     brdf: Literal["plastic"] = "plastic"
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("diffuse reflectance of the base", high=1.0, base=True))
     ior: Scalar = parameter(1.5, Parameter("index of refraction", low=1.0, high=3.0, usual=(1.0, 2.5)))
-    roughness: Scalar = parameter(0.2, Parameter("roughness of the surface, the square root of alpha", high=1.0))
+    roughness: Scalar = parameter(
+        0.2, Parameter("roughness of the surface, the square root of alpha; below 0.01 it counts as 0.01", high=1.0)
+    )
     fresnel: Literal["exact", "schlick"] = choice(
         "exact", "exact: Fresnel's formulas; schlick: Schlick's approximation of all of them"
     )

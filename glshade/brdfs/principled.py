@@ -41,9 +41,17 @@ class Principled(Brdf):
     metallic: Scalar = parameter(0.0, Parameter("0: dielectric, 1: metal", high=1.0))
     subsurface: Scalar = parameter(0.0, Parameter("share of the flat subsurface lobe in the diffuse light", high=1.0))
     specular: Scalar = parameter(0.5, Parameter("strength of the highlight: F0 = 0.08 specular", high=1.0))
-    roughness: Scalar = parameter(0.5, Parameter("roughness, the square root of alpha", high=1.0))
+    roughness: Scalar = parameter(
+        0.5, Parameter("roughness, the square root of alpha; the highlight's alpha is at least 0.001", high=1.0)
+    )
     specular_tint: Scalar = parameter(0.0, Parameter("how far the highlight takes the hue of the base colour", high=1.0))
-    anisotropy: Scalar = parameter(0.0, Parameter("how far the highlight is stretched along the tangent", high=1.0))
+    anisotropy: Scalar = parameter(
+        0.0,
+        Parameter(
+            "stretches the highlight along the tangent: alpha_x = alpha / s, alpha_y = alpha s, s = sqrt(1 - 0.9 anisotropy)",
+            high=1.0,
+        ),
+    )
     sheen: Scalar = parameter(0.0, Parameter("extra light at grazing angles, as cloth has", high=1.0))
     sheen_tint: Scalar = parameter(0.5, Parameter("how far the sheen takes the hue of the base colour", high=1.0))
     clearcoat: Scalar = parameter(0.0, Parameter("strength of the clear coat's highlight", high=1.0))

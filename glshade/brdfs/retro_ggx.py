@@ -33,7 +33,9 @@ class RetroGgx(Brdf):
     brdf: Literal["retro_ggx"] = "retro_ggx"
     kd: Colour = parameter((0.3, 0.3, 0.3), Parameter("diffuse reflectance", high=1.0, base=True))
     ks: Colour = parameter((0.5, 0.5, 0.5), Parameter("retro-reflectance at normal incidence", high=1.0))
-    roughness: Scalar = parameter(0.3, Parameter("square root of alpha, the width of the lobe", high=1.0, usual=(0.1, 1.0)))
+    roughness: Scalar = parameter(
+        0.3, Parameter("square root of alpha, the width of the lobe; below 0.01 it counts as 0.01", high=1.0, usual=(0.1, 1.0))
+    )
 
     def slots(self) -> dict[str, Slot]:
         diffuse = "none" if self.kd == (0.0, 0.0, 0.0) else "under_schlick"

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from glshade.brdfs import Brdf, widened
 from glshade.catalogue.albedo import directional_albedo
+from glshade.errors import figure
 from glshade.optics.fresnel import f0_conductor, f_conductor, f_dielectric, f_schlick
 
 Array = NDArray[np.float64]
@@ -58,7 +59,7 @@ def values(material: Brdf, incidence: float, v: Array, azimuth: float = 0.0, qua
     """
     l = direction(-incidence, azimuth)
     if not l[2] > 1e-9:
-        raise ValueError(f"incidence must be less than 90 degrees, not {np.degrees(incidence):g}")
+        raise ValueError(f"incidence must be less than 90 degrees, not {figure(np.degrees(incidence))}")
     f_cos = np.broadcast_to(type(material).brdf_cos(widened(material), np.broadcast_to(l, v.shape), v), v.shape)
     return f_cos / l[2] if quantity == "f" else np.array(f_cos)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import importlib
+import io
 import os
 import sys
 import warnings
@@ -13,7 +14,7 @@ from typing import NoReturn
 
 import click
 
-from glshade.errors import GlshadeError
+from glshade.errors import GlshadeError, printable
 from glshade.version import __version__
 
 # Without this, pydantic reads the metadata of every installed package to look for plug-ins, which takes 20 to 50 ms.
@@ -62,6 +63,19 @@ def silence() -> None:
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+def open_streams() -> None:
+    """Opens /dev/null in place of the standard streams that the caller has closed, as with `2>&-`.
+
+    Otherwise the next file to be opened would get the number of a standard stream, and drivers would print into it.
+    """
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        if getattr(sys, name) is None:
+            # The new file gets the lowest free number, which is that of the stream.
+            file = os.open(os.devnull, os.O_RDWR)
+            os.set_inheritable(file, True)
+            setattr(sys, name, os.fdopen(file, "w" if number else "r"))
+
+
 @click.group(cls=Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="glshade")
 def cli() -> None:
@@ -74,6 +88,7 @@ def main() -> None:
     The process ends without the shutdown of interpreter and driver, which would take 0.1 s. The operating system frees the
     memory faster.
     """
+    open_streams()
     try:
         run()
     except SystemExit as error:
@@ -90,20 +105,23 @@ def run() -> NoReturn:
 
     Known errors are printed to stderr, one line for each fault.
     """
-    warnings.showwarning = lambda message, *_: click.echo(f"glshade: warning: {message}", err=True)
+    warnings.showwarning = lambda message, *_: click.echo(f"glshade: warning: {printable(str(message))}", err=True)
     try:
         code = cli.main(standalone_mode=False)
     except GlshadeError as error:
-        for line in str(error).splitlines():
-            click.echo(f"glshade: {line}", err=True)
+        for line in str(error).split("\n"):
+            click.echo(f"glshade: {printable(line)}", err=True)
         code = error.exit_code
     except click.ClickException as error:
-        error.show()
+        shown = io.StringIO()
+        error.show(shown)
+        for line in shown.getvalue().rstrip("\n").split("\n"):
+            click.echo(printable(line), err=True)
         code = error.exit_code
     except (click.Abort, KeyboardInterrupt):
         click.echo("glshade: interrupted", err=True)
         code = INTERRUPTED
     except (OSError, MemoryError) as error:
-        click.echo(f"glshade: {error}", err=True)
+        click.echo(f"glshade: {printable(str(error))}", err=True)
         code = 1
     sys.exit(code if isinstance(code, int) else 0)

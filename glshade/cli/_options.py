@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from glshade.limits import DEFAULT, Limits
 
 if TYPE_CHECKING:
     from glshade.scene.scene import Scene
@@ -118,6 +121,32 @@ def _use_models(ctx: click.Context, option: click.Parameter, folders: tuple[str,
     return folders
 
 
+def limits(command: Any) -> Any:
+    """Adds the options that raise a limit. The command gets their values as one argument `limits`, as `glshade.load` takes it.
+
+    docs/security.md explains the limits.
+    """
+
+    @wraps(command)
+    def limited(
+        *arguments: Any, allow_outside: bool, max_triangles: int, max_pixels: int, max_texels: int, **others: Any
+    ) -> Any:
+        return command(*arguments, limits=Limits(allow_outside, max_triangles, max_pixels, max_texels), **others)
+
+    for name, help in (
+        ("triangles", "Largest number of triangles that the scene makes by shapes, subdivision and copies."),
+        ("pixels", "Largest number of shaded pixels of a picture."),
+        ("texels", "Largest number of pixels of all textures."),
+    ):
+        default = getattr(DEFAULT, f"max_{name}")
+        number = click.IntRange(1)
+        limited = click.option(f"--max-{name}", type=number, metavar="N", default=default, show_default=True, help=help)(
+            limited
+        )
+    outside = "Lets mesh files name buffers, materials and textures outside the folders of the mesh and of the scene's files."
+    return click.option("--allow-outside", is_flag=True, help=outside)(limited)
+
+
 def overrides(command: Any) -> Any:
     """Adds the option --set, whose value `overrides` holds (key, text) pairs, as `glshade.load` takes them."""
     return click.option(
@@ -162,4 +191,7 @@ def filmed(scene: Scene, changes: Mapping[str, Any]) -> Scene:
         first = error.errors(include_url=False)[0]
         key = str(first["loc"][0])
         raise click.BadParameter(first["msg"], param_hint=f"'--{OPTIONS.get(key, key)}'") from None
+    excess = film.excess(scene.limits)
+    if excess:
+        raise click.BadParameter(excess, param_hint=f"'--{OPTIONS.get(key := next(iter(changes)), key)}'")
     return scene.model_copy(update={"film": film})

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from glshade.cli import silence
+from glshade.errors import printable
 
 if TYPE_CHECKING:
     from rich.progress import TaskID
@@ -44,7 +45,7 @@ class Plain:
 
     def path(self, output: str) -> None:
         """Prints the path of a picture that is made."""
-        self._print(output)
+        self._print(printable(output))
 
     def warn(self, text: str) -> None:
         """Prints a warning, unless it was printed before."""
@@ -64,7 +65,7 @@ class Plain:
 
     def say(self, text: str) -> None:
         """Prints a line for the user to stderr."""
-        click.echo(f"glshade: {text}", err=True)
+        click.echo(f"glshade: {printable(text)}", err=True)
 
     def _print(self, line: str) -> None:
         """Prints a line to stdout. If the reader of stdout has gone, the pictures are made all the same."""
@@ -77,7 +78,7 @@ class Plain:
         """Prints a text of one or more lines to stderr, unless it was printed before."""
         if text not in self._printed:
             self._printed.add(text)
-            for line in text.splitlines():
+            for line in text.split("\n"):
                 self.say(line)
 
 
@@ -110,16 +111,16 @@ class Bar(Plain):
         super().picture(task, record)
         if self._task is not None:
             speed = self._bar.tasks[0].speed
-            self._bar.update(self._task, advance=1, rate=f"{speed:.1f}/s" if speed else "", current=record.output)
+            self._bar.update(self._task, advance=1, rate=f"{speed:.1f}/s" if speed else "", current=printable(record.output))
 
     def path(self, output: str) -> None:
         """Prints the path if stdout is not a terminal. The bar shows it in any case."""
         if not sys.stdout.isatty():
-            self._print(output)
+            self._print(printable(output))
 
     def say(self, text: str) -> None:
         """Prints a line above the bar."""
-        self._bar.console.print(f"glshade: {text}", highlight=False, markup=False, soft_wrap=True)
+        self._bar.console.print(f"glshade: {printable(text)}", highlight=False, markup=False, soft_wrap=True)
 
     def end(self, outcome: Outcome) -> None:
         """Stops the bar and leaves it on the terminal."""

@@ -161,9 +161,29 @@ def _picture(backend: str, device: int | None) -> str:
 # ULP may be arbitrarily large, so their absolute error is reported instead.
 _IN_ULP = ("+", "-", "*", "/", "sqrt", "inversesqrt", "exp2", "pow")
 
+# Whether triangles are clipped at the sides of the view, in words.
+_CLIPPING = {
+    True: "triangles are clipped at the sides of the view",
+    False: "triangles may reach beyond the sides of the view",
+    None: "cannot be seen, because corners do not snap to a coarse grid",
+}
+
+
+def _level_of_detail(measured: dict[str, Any]) -> str:
+    """Returns the rule for the level of detail in words."""
+    rules = {
+        "length": "from the longer of the two changes of texture coordinates per pixel",
+        "largest": "from the largest component of the changes of texture coordinates per pixel, the least that OpenGL allows",
+        "sum": "from the sum of the largest components of the changes per pixel, the most that OpenGL allows",
+        None: "by no known rule; the range that OpenGL allows is assumed",
+    }
+    return f"{rules[measured['rule']]}; off by {measured['error']:.2g}"
+
 
 def _table(measured: dict[str, Any]) -> list[tuple[str, str]]:
     """Returns the measurements that are of interest to people: (name, value)."""
+    from glshade.driver.raster import FINEST
+
     functions, formats = measured["built_ins"], measured["formats"]
     timer, loops, bits = measured["timer_query"], measured["loop_rounds"], measured["subpixel_bits"]
 
@@ -178,6 +198,7 @@ def _table(measured: dict[str, Any]) -> list[tuple[str, str]]:
         for stage, d in measured["denormals"].items()
     )
     shift = measured["interpolation_shift_in_steps"]
+    snapped = f"{FINEST} or more" if bits["measured"] == FINEST else str(bits["measured"])
     half, small = formats["RGBA16F"], formats["R11F_G11F_B10F"]
     return [
         ("error, ULP", ", ".join(f"{name} {functions[name]['ulp']:.2g}" for name in _IN_ULP)),
@@ -195,7 +216,10 @@ def _table(measured: dict[str, Any]) -> list[tuple[str, str]]:
         ),
         ("codes", ", ".join(f"{name} {formats[name]['lsb']:.2f}" for name in ("RGB10_A2", "RGBA8", "SRGB8_ALPHA8")) + " off"),
         ("timer query", f"reports {timer['share']:.2f} of the wall-clock time"),
-        ("sub-pixel bits", f"{bits['measured']} (the driver reports {bits['told']})"),
+        ("sub-pixel bits", f"{snapped} (the driver reports {bits['told']})"),
         ("interpolation", f"from corners {'before' if abs(shift) < 0.1 else 'after'} they are snapped to the grid"),
+        ("clipping", _CLIPPING[measured["clips_at_sides"]]),
+        ("level of detail", _level_of_detail(measured["level_of_detail"])),
+        ("filter weights", f"off by {measured['filter_weight_error']:.1e} texels"),
         ("samples", " ".join(f"({x:g}, {y:g})" for x, y in measured["sample_positions"]) or "none"),
     ]

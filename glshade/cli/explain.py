@@ -7,7 +7,8 @@ from typing import Any
 
 import click
 
-from glshade.cli._options import driver, models, overrides, shaders
+from glshade.cli._options import driver, limits, models, overrides, shaders
+from glshade.limits import Limits
 
 
 @click.command()
@@ -17,6 +18,7 @@ from glshade.cli._options import driver, models, overrides, shaders
     type=click.Choice(["flat", "gouraud", "phong"]),
     help="Shading per face, per vertex or per pixel, for the whole picture.",
 )
+@limits
 @overrides
 @click.option("--source", is_flag=True, help="Also prints the generated source of every program.")
 @click.option(
@@ -40,6 +42,7 @@ def command(
     scene: Path,
     shading: Any,
     overrides: list[tuple[str, str]],
+    limits: Limits,
     source: bool,
     active: bool,
     census: bool,
@@ -63,7 +66,7 @@ def command(
     from glshade.glsl.shaders import current
     from glshade.scene.file import load
 
-    explanation = explanation_of(load(scene, overrides), shading, current(shaders))
+    explanation = explanation_of(load(scene, overrides, limits=limits), shading, current(shaders))
     if as_json:
         from glshade.cli import _table
 

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from glshade.cli._options import driver, models, shaders
+from glshade.errors import figure
 
 # The values of --kind: the kinds of panels, and "all" for all of them.
 KINDS = ("all", "polar", "lobe", "sphere", "furnace", "albedo", "fresnel")
@@ -29,7 +30,7 @@ class Angles(click.ParamType[tuple[float, ...]]):
             self.fail(f"{value!r} is not a list of angles such as 0,30,60", param, ctx)
         for angle in angles:
             if not 0 <= angle < 90:
-                self.fail(f"must be from 0 to less than 90 degrees, not {angle:g}", param, ctx)
+                self.fail(f"must be from 0 to less than 90 degrees, not {figure(angle)}", param, ctx)
         return tuple(dict.fromkeys(angles))
 
 

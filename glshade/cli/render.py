@@ -6,15 +6,16 @@ import os
 import warnings
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from glshade.cli._options import Crop, Duration, Size, driver, filmed, models, overrides, shaders
+from glshade.cli._options import Crop, Duration, Size, driver, filmed, limits, models, overrides, shaders
 from glshade.image.formats import FORMATS
+from glshade.limits import DEFAULT, MOST_TASKS, Limits
 from glshade.mesh.formats import SUFFIXES
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ if TYPE_CHECKING:
 )
 @click.option("--skip-existing", is_flag=True, help="Skips pictures whose files exist.")
 @click.option(
-    "--resume", is_flag=True, help="Skips pictures whose files already hold the same picture, by the digest in the file."
+    "--resume", is_flag=True, help="Skips pictures whose files hold the same bytes already, by the hashes in the manifest."
 )
 @click.option(
     "--jobs",
@@ -63,6 +64,14 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--cluster", metavar="ADDRESS", help="Runs on dask: `local`, or a scheduler such as tcp://host:8786. Needs glshade[dist]."
+)
+@click.option(
+    "--max-tasks",
+    type=click.IntRange(1),
+    metavar="N",
+    default=MOST_TASKS,
+    show_default=True,
+    help="Largest number of pictures of a batch.",
 )
 @click.option(
     "--retries",
@@ -89,6 +98,7 @@ if TYPE_CHECKING:
     type=click.Choice(["flat", "gouraud", "phong"]),
     help="Shading per face, per vertex or per pixel, for the whole picture.",
 )
+@limits
 @overrides
 @click.option("--reference", is_flag=True, help="Draws with the float64 reference on the CPU, with one sample per pixel.")
 @click.option("--exposure", type=float, help="Overrides the film's exposure [stops].")
@@ -129,12 +139,14 @@ def command(
     resume: bool,
     jobs: int | None,
     cluster: str | None,
+    max_tasks: int,
     retries: int,
     manifest: Path | None,
     as_json: bool,
     tile: int | None,
     shading: Any,
     overrides: list[tuple[str, str]],
+    limits: Limits,
     reference: bool,
     budget: tuple[str, ...],
     deadline: float | None,
@@ -157,8 +169,8 @@ def command(
 
     if output is not None:
         check_suffix(Path(output))
-    limits = _limits(budget)
-    if (limits or deadline) and (reference or shading or (limits and deadline)):
+    allowed = _limits(budget)
+    if (allowed or deadline) and (reference or shading or (allowed and deadline)):
         raise click.UsageError(
             "--budget and --deadline choose the settings, so they exclude each other, --shading and --reference"
         )
@@ -166,8 +178,9 @@ def command(
         raise click.UsageError("--overwrite, --skip-existing and --resume exclude each other")
     film |= {"samples": samples and int(samples), "ocio": ocio and _configuration(ocio), "aovs": _names(aovs)}
     film = {key: value for key, value in film.items() if value is not None}
-    pictures = _pictures(scenes, frames, cameras, output, sweeps)
-    common = {"film": film, "shading": shading, "reference": reference, "tile": tile, "resume": resume}
+    pictures = _pictures(scenes, frames, cameras, output, sweeps, max_tasks)
+    raised = {name: value for name, value in asdict(limits).items() if value != getattr(DEFAULT, name)}
+    common = {"limits": raised, "film": film, "shading": shading, "reference": reference, "tile": tile, "resume": resume}
     tasks = [_task(number, picture, overrides, common) for number, picture in enumerate(pictures)]
     several = len(tasks) > 1 or cluster is not None
     skipped = [task for task in tasks if os.path.exists(task.output)] if skip_existing else []
@@ -195,17 +208,19 @@ def command(
         maker = Maker(backend, device, shaders, models)
         stack.callback(maker.close)
         first = _checked(wanted, maker, display)
-        if limits or deadline:
-            wanted = _at_settings(wanted, first, maker, limits, deadline)
+        if allowed or deadline:
+            wanted = _at_settings(wanted, first, maker, allowed, deadline)
         if workers is None:
             from glshade.batch.in_process import InProcess
 
             # The scenes that were checked are used again, unless --budget or --deadline changes their settings.
-            workers = InProcess(maker, {} if limits or deadline else first, reference)
+            workers = InProcess(maker, {} if allowed or deadline else first, reference)
         if several:
             _make_folders(wanted)
         leftovers.remove(task.output for task in wanted)
         log = stack.enter_context(Manifest(manifest)) if manifest and wanted else None
+        if log is not None and resume:
+            wanted = [replace(task, known=log.known(task.output)) for task in wanted]
         outcome = run_batch(wanted, workers, log, display, skipped=skipped, since=since)
     if several:
         # A worker of a command that was killed may have been alive when this batch began, and have ended since.
@@ -214,10 +229,15 @@ def command(
 
 
 def _pictures(
-    scenes: Sequence[Path], frames: str | None, cameras: tuple[str, ...], output: str | None, sweeps: tuple[str, ...]
+    scenes: Sequence[Path],
+    frames: str | None,
+    cameras: tuple[str, ...],
+    output: str | None,
+    sweeps: tuple[str, ...],
+    most: int,
 ) -> list[Shot]:
     """Returns the pictures to make, from the values of the options. Errors: click.BadParameter, which names the option."""
-    from glshade.batch.frames import parse, parse_sweep, pictures
+    from glshade.batch.frames import check_count, parse, parse_sweep, pictures
 
     try:
         numbers = None if frames is None else parse(frames)
@@ -227,6 +247,10 @@ def _pictures(
         swept = [parse_sweep(text) for text in sweeps]
     except ValueError as error:
         raise click.BadParameter(str(error), param_hint="'--sweep'") from None
+    try:
+        check_count(len(scenes), len(cameras), len(numbers) if numbers else 1, swept, most)
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="'--max-tasks'") from None
     try:
         return list(pictures(scenes, numbers, cameras, output, swept))
     except ValueError as error:

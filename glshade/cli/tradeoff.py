@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from glshade.cli._options import Size, driver, filmed, models, overrides, shaders
+from glshade.cli._options import Size, driver, filmed, limits, models, overrides, shaders
+from glshade.limits import Limits
 
 if TYPE_CHECKING:
     from glshade.tradeoff.study import Study
@@ -36,6 +37,7 @@ Progress = Callable[[str, int, int], None]
 )
 @click.option("--repeat", type=click.IntRange(1, 1000), help="Number of timings of each setting. [default: 15]")
 @click.option("--size", type=Size(), help="Overrides the film's size [pixels].")
+@limits
 @overrides
 @click.option("--again", is_flag=True, help="Repeats the measurements that the folder already holds.")
 @driver
@@ -50,6 +52,7 @@ def command(
     repeat: int | None,
     size: tuple[int, int] | None,
     overrides: list[tuple[str, str]],
+    limits: Limits,
     again: bool,
     backend: Any,
     device: int | None,
@@ -71,7 +74,7 @@ def command(
     from glshade.tradeoff.study import REPEAT
 
     wanted = _knobs(knobs)
-    loaded = filmed(load(scene, overrides), {"size": size})
+    loaded = filmed(load(scene, overrides, limits=limits), {"size": size})
     folder = output or Path(f"tradeoff-{scene.stem.removeprefix('tradeoff-')}")
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from glshade.cli._options import Size, driver, filmed, models, overrides, shaders
+from glshade.cli._options import Size, driver, filmed, limits, models, overrides, shaders
+from glshade.limits import Limits
 
 if TYPE_CHECKING:
     from glshade.scene.scene import Scene
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     type=click.Choice(["flat", "gouraud", "phong"]),
     help="Shading per face, per vertex or per pixel, for the whole picture.",
 )
+@limits
 @overrides
 @click.option(
     "--report", type=click.Path(path_type=Path, file_okay=False), help="Writes a page with the evidence to this folder."
@@ -53,6 +55,7 @@ def command(
     models: tuple[str, ...],
     shading: Any,
     overrides: list[tuple[str, str]],
+    limits: Limits,
     report: Path | None,
     as_json: bool,
     max_ambiguous: float,
@@ -71,7 +74,7 @@ def command(
         raise click.UsageError("Missing argument 'SCENE'.")
     from glshade.scene.file import load
 
-    loaded = filmed(load(scene, overrides), {"size": size})
+    loaded = filmed(load(scene, overrides, limits=limits), {"size": size})
     if mutate is not None:
         _mutate(loaded, mutate, backend, device, shaders, shading, as_json)
         return

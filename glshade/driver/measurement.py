@@ -10,6 +10,7 @@ from typing import Any
 
 from glshade.driver.arithmetic import measure_arithmetic
 from glshade.driver.clock import measure_timer_query
+from glshade.driver.detail import measure_detail
 from glshade.driver.formats import measure_formats
 from glshade.driver.raster import measure_raster
 from glshade.errors import ContextError, ShaderError
@@ -28,6 +29,7 @@ def measure(context: Context) -> dict[str, Any]:
             formats = measure_formats(context)
             timer_query = measure_timer_query(context)
             raster = measure_raster(context)
+            detail = measure_detail(context)
     except ShaderError as error:
         raise ContextError(f"the driver refuses a shader that measures it: {' '.join(str(error).split())}") from None
-    return {**arithmetic, "formats": formats, "timer_query": timer_query, **raster}
+    return {**arithmetic, "formats": formats, "timer_query": timer_query, **raster, **detail}

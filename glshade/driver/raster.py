@@ -1,5 +1,5 @@
 """Raster: measures a driver's rasteriser: the grid to which it snaps corners, the corners from which it interpolates attributes
-(as given or snapped), and the positions of samples in a pixel.
+(as given or snapped), whether it clips triangles at the sides of the view, and the positions of samples in a pixel.
 """
 
 from __future__ import annotations
@@ -23,21 +23,27 @@ Float32 = NDArray[np.float32]
 
 # The values of OpenGL's enumerants in Khronos' registry (gl.xml).
 GL_SUBPIXEL_BITS, GL_SAMPLE_POSITION = 0x0D50, 0x8E50
+# `_subpixel_bits` cannot see a finer grid than one of this many bits.
+FINEST = 10
 
 
 def measure_raster(context: Context) -> dict[str, Any]:
-    """Measures three properties of the rasteriser. Returns a dictionary ready for JSON:
+    """Measures properties of the rasteriser. Returns a dictionary ready for JSON:
 
     "subpixel_bits": the number of binary digits below one pixel of a corner's coordinates: "told" is the driver's own answer,
-        "measured" is the result of drawing.
+        "measured" is the result of drawing, at most FINEST.
     "interpolation_shift_in_steps": see `_interpolation_shift`.
+    "clips_at_sides": whether triangles are clipped at the sides of the view; None if it cannot be seen, because the driver does
+        not snap corners to 1/256 pixel or a coarser grid.
     "sample_positions": see `_sample_positions`.
     Errors: ShaderError, ContextError.
     """
     program = load_program(context, "driver/geometry.vert", "driver/geometry.frag")
+    bits = _subpixel_bits(context, program)
     return {
-        "subpixel_bits": {"told": _reported_subpixel_bits(context), "measured": _subpixel_bits(context, program)},
+        "subpixel_bits": {"told": _reported_subpixel_bits(context), "measured": bits},
         "interpolation_shift_in_steps": _interpolation_shift(context, program),
+        "clips_at_sides": _clips_at_sides(context, program) if 2**bits <= SUBPIXELS else None,
         "sample_positions": _sample_positions(context),
     }
 
@@ -67,15 +73,15 @@ def _reported_subpixel_bits(context: Context) -> int | None:
 def _subpixel_bits(context: Context, program: Program) -> int:
     """Returns the number of binary digits below one pixel to which the driver snaps corners.
 
-    To find it, this function counts how many grid points a corner takes while it slides over 1/16 pixel. Each of 256 columns
+    To find it, this function counts how many grid points a corner takes while it slides over 1/16 pixel. Each of 64 columns
     holds a quadrilateral whose left edge leans from x = 0.25 at the bottom to x = 0.75 + d at the top, where d grows from
     column to column. The edge crosses the middle of its column at a height that depends on d: if d grows by 1/256 pixel, the
-    crossing moves by more than 12 of the 4096 rows. So two columns have equally many covered pixels only if the driver snaps
+    crossing moves by more than 6 of the 2048 rows. So two columns have equally many covered pixels only if the driver snaps
     their upper left corners to the same grid point.
     """
-    columns, rows = 256, 4096
+    columns, rows = 2**FINEST // 16, 2048
     column = np.arange(columns, dtype=np.float64)
-    d = column / 4096.0
+    d = column / 2.0**FINEST
 
     def corner(x: Array, y: float) -> Array:
         return np.stack([x, np.full(columns, y)], axis=1)
@@ -100,6 +106,24 @@ def _interpolation_shift(context: Context, program: Program) -> float:
     pixels = _draw(context, program, (64, 64), corners)
     shift = pixels[pixels[..., 3] > 0][:, 0].astype(np.float64)
     return rounded(np.median(shift) * SUBPIXELS)
+
+
+def _clips_at_sides(context: Context, program: Program) -> bool:
+    """Returns whether the driver clips triangles that reach beyond the side of the view.
+
+    A clipped triangle gets new corners at the side, which are snapped to the grid. Each of four triangles has an edge that
+    rises from a corner in the view by a few sub-pixel steps, to a corner twice as far away as the side. Snapping at the side
+    turns the edge, so that it passes the centres of a row of pixels elsewhere: by at least 6 of the 256 pixels.
+    """
+    width, start, reach = 256, 8.0, 504.0
+    for steps in (5, 7, 9, 11):
+        # The edge passes the row's centres, at 4.5, after a rise of 2 steps.
+        low = 4.5 - 2 / SUBPIXELS
+        corners = np.array([[start, low], [reach, low + steps / SUBPIXELS], [start, 12.0]])
+        covered = (_draw(context, program, (width, 8), corners)[4, :, 3] > 0).sum()
+        if abs(covered - (reach - start) * 2 / steps) > 2:
+            return True
+    return False
 
 
 def _sample_positions(context: Context) -> list[list[float]]:

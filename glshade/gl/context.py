@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ import glcontext
 import moderngl
 
 from glshade.errors import ContextError
+from glshade.gl.mesa_cache import reserve_index
 
 if TYPE_CHECKING:
     from glshade.gl.linker import Linker
@@ -36,6 +38,12 @@ EGL_PLATFORM_DEVICE_EXT = 0x313F
 
 # Parts of the GL_RENDERER strings, in lower case, of renderers that run on the CPU.
 SOFTWARE = ("llvmpipe", "softpipe", "swiftshader", "software rasterizer")
+
+# The environment variables that choose a driver. A wrong value looks like a missing driver.
+CHOOSING = ("GALLIUM_DRIVER", "MESA_LOADER_DRIVER_OVERRIDE", "LIBGL_DRIVERS_PATH", "__EGL_VENDOR_LIBRARY_FILENAMES")
+# llvmpipe's GL_RENDERER string ends with the width of its vectors. Mesa 22.3 crashes when it draws with another width than
+# these, which only the environment variable LP_NATIVE_VECTOR_WIDTH can ask for [bits].
+WIDTH, WIDTHS = re.compile(r"llvmpipe.* (\d+) bits"), ("128", "256")
 
 ADVICE = "install a driver (Debian, Ubuntu: apt install libegl1 libgl1-mesa-dri), then see `glshade doctor`"
 
@@ -68,7 +76,6 @@ _opened: set[str] = set()
 class Context:
     """An OpenGL context. It is current after its creation.
 
-    gl: moderngl's context.
     backend: egl, osmesa or standalone.
     linker: loads programs from the disk cache; None if the cache is off or the driver offers no program binaries.
     zero_to_one: whether clip z runs from 0 to 1. Reversed float depth gains precision only with this range.
@@ -77,7 +84,7 @@ class Context:
     def __init__(
         self, gl: moderngl.Context, backend: str, procedure: Callable[[str], int | None], linker: Linker | None = None
     ) -> None:
-        self.gl, self.backend, self.linker = gl, backend, linker
+        self._gl, self.backend, self.linker = gl, backend, linker
         self._procedure = procedure
         # Only gc() deletes the GL objects that Python no longer uses, and it runs while this context is current. In another
         # context the same number may name an object that is in use.
@@ -89,6 +96,17 @@ class Context:
         self.zero_to_one = clip_control is not None and (gl.version_code >= 450 or "GL_ARB_clip_control" in gl.extensions)
         if self.zero_to_one and clip_control is not None:
             clip_control(GL_LOWER_LEFT, GL_ZERO_TO_ONE)
+
+    @property
+    def gl(self) -> moderngl.Context:
+        """moderngl's context. Errors: ContextError after `release`."""
+        self.check_open()
+        return self._gl
+
+    def check_open(self) -> None:
+        """Checks that the context may be used. Errors: ContextError after `release`."""
+        if self._released:
+            raise ContextError("the OpenGL context, or the Renderer that had it, has been released: make a new one")
 
     @property
     def renderer(self) -> str:
@@ -130,7 +148,7 @@ class Context:
         """Destroys the context and all of its objects. A second call does nothing."""
         if not self._released:
             self._released = True
-            self.gl.release()
+            self._gl.release()
 
 
 def open_context(backend: Backend = "auto", device: int | None = None, program_cache: bool | None = None) -> Context:
@@ -180,7 +198,9 @@ def _open_egl(device: int | None, cached: bool) -> Context:
             count = len(devices())
             if not 0 <= device < count:
                 raise ContextError(f"there is no EGL device {device}: `glshade devices` lists {count}") from None
-        raise ContextError(f"EGL gives no OpenGL {REQUIRED_VERSION / 100:.1f} context ({error}); {ADVICE}") from None
+        chosen = [f"{name}={os.environ[name]}" for name in CHOOSING if name in os.environ]
+        advice = f"check {', '.join(chosen)} in the environment, or {ADVICE}" if chosen else ADVICE
+        raise ContextError(f"EGL gives no OpenGL {REQUIRED_VERSION / 100:.1f} context ({error}); {advice}") from None
     _opened.add("egl")
 
     def procedure(name: str) -> int | None:
@@ -188,7 +208,7 @@ def _open_egl(device: int | None, cached: bool) -> Context:
         address: int | None = egl.eglGetProcAddress(name.encode())
         return address
 
-    return Context(gl, "egl", procedure, linker)
+    return _checked(Context(gl, "egl", procedure, linker))
 
 
 def _open_osmesa(cached: bool, instead_of: ContextError | None = None) -> Context:
@@ -200,9 +220,10 @@ def _open_osmesa(cached: bool, instead_of: ContextError | None = None) -> Contex
     # An EGL context leaves state in its thread; making an OSMesa context current afterwards crashes the driver.
     if "egl" in _opened:
         raise instead_of or ContextError("this process has used EGL already; OSMesa needs a process of its own")
-    from glshade.gl.osmesa import OSMesa
+    from glshade.gl.osmesa import OSMesa, check_driver
 
     try:
+        check_driver()
         own = OSMesa(REQUIRED_VERSION)
     except ContextError as error:
         raise instead_of or error from None
@@ -211,7 +232,7 @@ def _open_osmesa(cached: bool, instead_of: ContextError | None = None) -> Contex
     except Exception as error:
         raise ContextError(f"OSMesa gives no OpenGL {REQUIRED_VERSION / 100:.1f} context ({error})") from None
     _opened.add("osmesa")
-    return Context(gl, "osmesa", own.load_opengl_function, linker)
+    return _checked(Context(gl, "osmesa", own.load_opengl_function, linker))
 
 
 def _wrapped(window: Any, backend: str, cached: bool) -> tuple[moderngl.Context, Linker | None]:
@@ -228,8 +249,18 @@ def _wrapped(window: Any, backend: str, cached: bool) -> tuple[moderngl.Context,
     return moderngl.create_context(standalone=True, **settings), linker
 
 
+def _checked(context: Context) -> Context:
+    """Returns a new context that can draw. Errors: ContextError for a width of vectors with which llvmpipe crashes."""
+    width = WIDTH.match(context.renderer)
+    if width and width[1] not in WIDTHS:
+        context.release()
+        raise ContextError(f"llvmpipe crashes with vectors of {width[1]} bits: set LP_NATIVE_VECTOR_WIDTH to 128 or 256")
+    return context
+
+
 def load_egl() -> ctypes.CDLL:
     """The EGL library. Errors: ContextError if it is missing."""
+    reserve_index()
     try:
         return ctypes.CDLL(LIBEGL)
     except OSError as error:

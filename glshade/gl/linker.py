@@ -10,7 +10,10 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 import moderngl
@@ -23,6 +26,12 @@ GL_VENDOR, GL_RENDERER, GL_VERSION = 0x1F00, 0x1F01, 0x1F02
 GL_NUM_PROGRAM_BINARY_FORMATS, GL_PROGRAM_BINARY_FORMATS = 0x87FE, 0x87FF
 GL_PROGRAM_BINARY_RETRIEVABLE_HINT, GL_PROGRAM_BINARY_LENGTH = 0x8257, 0x8741
 GL_COMPILE_STATUS, GL_LINK_STATUS = 0x8B81, 0x8B82
+
+# The beginnings of the names of Mesa's environment variables, many of which change the code that it generates.
+MESA = ("DRAW_", "GALLIUM_", "GALLIVM_", "LP_", "MESA_", "NIR_", "SOFTPIPE_", "ST_")
+# The variables of these beginnings that change no code: where and whether Mesa caches, what it logs, and with how many threads
+# it draws.
+HARMLESS = ("LP_NUM_THREADS", "MESA_GLSL_CACHE_", "MESA_LOG", "MESA_SHADER_CACHE_")
 
 _uint, _int, _pointer = ctypes.c_uint, ctypes.c_int, ctypes.c_void_p
 _SIGNATURES: dict[str, Any] = {
@@ -71,7 +80,7 @@ class Linker:
             names = [self._gl["glGetString"](name) or b"" for name in (GL_VENDOR, GL_RENDERER, GL_VERSION)]
             # The backend is part of the key: EGL and OSMesa load different libraries of the same driver, and neither needs to
             # accept the other's binaries.
-            self._driver = repr((__version__, backend, names, formats))
+            self._driver = repr((__version__, backend, names, formats, settings(os.environ), processor()))
             for name, own in (
                 ("glCompileShader", self._compile),
                 ("glGetShaderiv", self._ask_shader),
@@ -118,7 +127,8 @@ class Linker:
         return program
 
     def key(self, vertex: str, fragment: str | None) -> str:
-        """The cache key of a program: a digest of its texts, the driver, the driver's formats and glshade's version."""
+        """The cache key of a program: a digest of its texts, the driver, the driver's formats and settings, the processor and
+        glshade's version."""
         return hashlib.sha256("\0".join((self._driver, vertex, fragment or "")).encode()).hexdigest()
 
     def _make(self, gl: moderngl.Context, vertex: str, fragment: str | None, binary: Binary | None) -> moderngl.Program:
@@ -194,3 +204,18 @@ class Linker:
         value = _int()
         self._gl["glGetProgramiv"](program, name, ctypes.byref(value))
         return value.value
+
+
+def settings(environment: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Returns the (name, value) of each environment variable that may change the code that Mesa generates, sorted."""
+    return sorted(item for item in environment.items() if item[0].startswith(MESA) and not item[0].startswith(HARMLESS))
+
+
+@cache
+def processor() -> str:
+    """Returns the features of the processor, whose instructions llvmpipe uses; "" where the system does not list them."""
+    try:
+        with Path("/proc/cpuinfo").open() as file:
+            return next((line for line in file if line.startswith(("flags", "Features"))), "")
+    except OSError:
+        return ""

@@ -6,9 +6,14 @@ The class OSMesa has the four methods that moderngl needs of an object for its a
 from __future__ import annotations
 
 import ctypes
+import os
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 from glshade.errors import ContextError
+from glshade.gl.mesa_cache import reserve_index
 
 LIBRARIES = ("libOSMesa.so.8", "libOSMesa.so.6")
 # The values are those of GL/osmesa.h.
@@ -18,8 +23,22 @@ OSMESA_CONTEXT_MAJOR_VERSION, OSMESA_CONTEXT_MINOR_VERSION = 0x36, 0x37
 GL_UNSIGNED_BYTE = 0x1401
 
 
+def check_driver() -> None:
+    """Makes a context in another process, because OSMesa crashes if $GALLIUM_DRIVER names a driver that does not exist.
+
+    Errors: ContextError if the other process crashes.
+    """
+    root = str(Path(__file__).resolve().parents[2])
+    # -S leaves out site-packages: the other process needs nothing but this file, and starts three times as fast.
+    command = [sys.executable, "-S", "-P", "-m", "glshade.gl.osmesa"]
+    code = subprocess.run(command, env={**os.environ, "PYTHONPATH": root}, capture_output=True, check=False).returncode
+    if code < 0:
+        raise ContextError(f"OSMesa's driver crashes: is GALLIUM_DRIVER={os.environ.get('GALLIUM_DRIVER', '')} right?")
+
+
 def load() -> ctypes.CDLL:
     """The OSMesa library. Errors: ContextError if it is missing."""
+    reserve_index()
     for name in LIBRARIES:
         try:
             return ctypes.CDLL(name)
@@ -77,3 +96,8 @@ class OSMesa:
         if self._context:
             self._library.OSMesaDestroyContext(self._context)
             self._context = None
+
+
+if __name__ == "__main__":
+    # This is the other process of `check_driver`.
+    OSMesa(330)

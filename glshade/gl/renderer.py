@@ -81,7 +81,7 @@ class Renderer:
         self.release()
 
     def release(self) -> None:
-        """Destroys the context and all of its objects. A second call does nothing."""
+        """Destroys the context and all of its objects. A second call does nothing; any other use raises ContextError."""
         self.context.release()
 
     def render(self, scene: Scene, *, dtype: DType = "uint8", shading: Rate | None = None, tile: int | None = None) -> Image:
@@ -188,6 +188,7 @@ class Renderer:
         part: optional; the part of the scene's light, or the property of its surfaces, that is drawn.
         Errors: SceneError, ShaderError.
         """
+        self.context.check_open()
         key = (id(scene), shading, encoding, part, self.rewrite)
         prepared = self._prepared.get(key)
         if prepared is None or prepared.scene is not scene or not prepared.is_current():

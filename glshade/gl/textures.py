@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import ctypes
+from collections.abc import Sequence
 
 import moderngl
+import numpy as np
+from numpy.typing import NDArray
 
 from glshade.gl.context import GL_TEXTURE_2D, GL_TEXTURE_WRAP_S, GL_TEXTURE_WRAP_T, Context
 from glshade.textures.mipmap import levels
@@ -12,6 +15,9 @@ from glshade.textures.texels import Texels
 
 # Wrap mode -> value in Khronos' registry (gl.xml).
 WRAP = {"repeat": 0x2901, "clamp": 0x812F, "mirror": 0x8370}
+
+# Khronos' registry values (gl.xml).
+GL_RGBA32F, GL_RGBA, GL_FLOAT = 0x8814, 0x1908, 0x1406
 
 
 def upload(context: Context, texels: Texels) -> moderngl.Texture:
@@ -24,16 +30,42 @@ def upload(context: Context, texels: Texels) -> moderngl.Texture:
     chain = list(levels(texels.read()))
     while max(chain[0].shape[:2]) > context.largest_side:
         chain.pop(0)
-    height, width, _ = chain[0].shape
-    result = context.gl.texture((width, height), 4, chain[0].tobytes(), dtype="f4")
-    result.build_mipmaps()
-    for level, pixels in enumerate(chain[1:], 1):
-        result.write(pixels.tobytes(), level=level)
-    result.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    result = mipmapped(context, chain)
     result.repeat_x, result.repeat_y = (mode != "clamp" for mode in texels.wrap)
     if "mirror" in texels.wrap:
         _mirror(context, result, texels.wrap)
     return result
+
+
+def mipmapped(context: Context, chain: Sequence[NDArray[np.float32]]) -> moderngl.Texture:
+    """A repeating texture with trilinear filtering.
+
+    context: the context, which must be current.
+    chain: the pixels (h, w, 4) of all levels, from the largest to the one of a single pixel.
+    """
+    height, width, _ = chain[0].shape
+    result = context.gl.texture((width, height), 4, chain[0].tobytes(), dtype="f4")
+    _add_levels(context, result, chain[1:])
+    result.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    return result
+
+
+def _add_levels(context: Context, texture: moderngl.Texture, chain: Sequence[NDArray[np.float32]]) -> None:
+    """Uploads the levels of a texture that follow its largest one."""
+    types = (*[ctypes.c_uint] * 2, *[ctypes.c_int] * 4, *[ctypes.c_uint] * 2, ctypes.c_char_p)
+    define = context.procedure("glTexImage2D", None, *types)
+    if define is None:
+        # moderngl writes only to levels that exist, and makes them by drawing them. Compiling the driver's program for that
+        # takes 80 ms on llvmpipe.
+        texture.build_mipmaps()
+        for level, pixels in enumerate(chain, 1):
+            texture.write(pixels.tobytes(), level=level)
+        return
+    # glTexImage2D changes the texture that is bound to the active unit. moderngl reserves a unit for such calls.
+    texture.use(context.gl.default_texture_unit)
+    for level, pixels in enumerate(chain, 1):
+        height, width, _ = pixels.shape
+        define(GL_TEXTURE_2D, level, GL_RGBA32F, width, height, 0, GL_RGBA, GL_FLOAT, pixels.tobytes())
 
 
 def _mirror(context: Context, texture: moderngl.Texture, wrap: tuple[str, str]) -> None:

@@ -17,7 +17,9 @@ from typing import TypeAlias
 
 from glshade.document import nearest
 from glshade.errors import ShaderError
+from glshade.files import read_bytes
 from glshade.glsl.source import Code, Declaration, Include, Stage, Storage
+from glshade.limits import LARGEST_SHADER
 from glshade.scene.models import model_folders
 
 _PACKAGE = Path(__file__).parent.parent
@@ -256,7 +258,7 @@ def _read(path: Path) -> ShaderFile | None:
     if stamp is None or not path.is_file():
         return None
     try:
-        return ShaderFile(path, stamp, tuple(path.read_text(encoding="utf-8").splitlines()))
+        return ShaderFile(path, stamp, tuple(read_bytes(path, LARGEST_SHADER).decode("utf-8").splitlines()))
     except UnicodeDecodeError as error:
         raise ShaderError(f"{path}: is not UTF-8 text (byte {error.start})") from None
     except OSError as error:

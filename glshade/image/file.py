@@ -98,6 +98,15 @@ def probe(path: str | Path) -> None:
         raise _unreadable(path, error) from None
 
 
+def pixel_count(path: str | Path) -> int:
+    """Returns the number of pixels of a picture, from its file's header. Errors: AssetError."""
+    try:
+        width, height = _format_to_read(path).size(Path(path))
+    except OSError as error:
+        raise _unreadable(path, error) from None
+    return width * height
+
+
 def _format_to_read(path: str | Path) -> PictureFormat:
     """Returns the format of the path's suffix, by default PictureFormat, which leaves everything to OpenImageIO."""
     name = Path(path).suffix.lower()[1:]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,12 +12,19 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from glshade.files import check_regular
 from glshade.image.contents import PictureContents
+
+# Linux's folder with a path for each open file of this process, through which libraries can write to a file in memory.
+OPEN_FILES = "/proc/self/fd"
+# An encoded picture is copied from memory to its file in pieces of this size [bytes].
+COPIED = 1 << 20
 
 
 def write(path: Path, contents: PictureContents, settings: Mapping[str, str | int], window: bool) -> None:
     """Writes a picture file in the format that the suffix of `path` names.
 
+    On Linux with /proc the file is encoded in memory: if the disk were full, the JPEG library would end the process.
     settings: OpenImageIO's attributes of the file, by name, in the order in which they are set.
     window: True to store the place of a crop and the size of the whole picture.
     Errors: OSError, with the reason as its text.
@@ -29,7 +38,17 @@ def write(path: Path, contents: PictureContents, settings: Mapping[str, str | in
     output = oiio.ImageOutput.create(str(path))
     if output is None:
         raise OSError(_one_line(oiio.geterror()))
-    written = output.open(str(path), spec) and output.write_image(_contiguous(contents.pixels))
+    if not hasattr(os, "memfd_create") or not Path(OPEN_FILES).is_dir():
+        _encode(output, str(path), spec, contents.pixels)
+        return
+    with open(os.memfd_create("picture"), "rb") as memory, path.open("wb") as file:
+        _encode(output, f"{OPEN_FILES}/{memory.fileno()}", spec, contents.pixels)
+        shutil.copyfileobj(memory, file, COPIED)
+
+
+def _encode(output: Any, path: str, spec: oiio.ImageSpec, pixels: NDArray[Any]) -> None:
+    """Writes pixels (H, W, C) to a file in the format of `output`. Errors: OSError, with the reason as its text."""
+    written = output.open(path, spec) and output.write_image(_contiguous(pixels))
     # close() writes the buffered rest. On a full disk it may return True and leave an error message. A message about
     # Exif is no failure: the TIFF writer leaves it if it could not add a table of Exif data.
     closed = output.close()
@@ -59,6 +78,17 @@ def read(path: Path) -> PictureContents:
     )
 
 
+def size(path: Path) -> tuple[int, int]:
+    """Returns the width and height of a picture from its file's header [pixels].
+
+    Errors: OSError, with the reason as its text.
+    """
+    source = _opened(path)
+    spec = source.spec()
+    source.close()
+    return spec.width, spec.height
+
+
 def attributes(path: Path) -> dict[str, str]:
     """Returns the texts in a file's header, by name, without reading its pixels.
 
@@ -72,6 +102,7 @@ def attributes(path: Path) -> dict[str, str]:
 
 def _opened(path: Path, *config: oiio.ImageSpec) -> Any:
     """Returns the file, opened for reading. Errors: OSError."""
+    check_regular(path)
     source = oiio.ImageInput.open(str(path), *config)
     if source is None:
         raise OSError(_one_line(oiio.geterror()))

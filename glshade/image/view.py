@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from glshade.document import nearest
 from glshade.errors import SceneError
+from glshade.files import check_regular
 from glshade.image.image import Encoding, Image
 
 # The configuration built into OpenColorIO: ACES for computer graphics.
@@ -100,6 +101,11 @@ def _loaded(name: str, key: str, display: str | None, view: str | None) -> ViewT
     """
     import OpenImageIO as oiio
 
+    if not name.startswith("ocio://"):
+        try:
+            check_regular(name)
+        except (OSError, ValueError) as error:
+            raise SceneError(f"{key}: {name}: cannot be read: {getattr(error, 'strerror', error)}") from None
     config = oiio.ColorConfig(name)
     message = " ".join(config.geterror().split())
     displays = list(config.getDisplayNames())

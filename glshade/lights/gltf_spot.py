@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from glshade.document import Direction
+from glshade.errors import figure
 from glshade.lights import Array, Placed, direction_and_distance
 
 # The least difference of the cosines of the inner and outer angle. KHR_lights_punctual and pyrender use the same.
@@ -33,7 +34,7 @@ class GltfSpotLight(Placed):
         if isinstance(data, Mapping):
             inner, outer = data.get("inner", 0.0), data.get("outer", 45.0)
             if isinstance(inner, int | float) and isinstance(outer, int | float) and inner > outer:
-                yield ("inner",), f"{inner:g} must not be larger than outer, {outer:g}"
+                yield ("inner",), f"{figure(inner)} must not be larger than outer, {figure(outer)}"
 
     def uniforms(self, eye: Array) -> dict[str, Any]:
         axis, _ = direction_and_distance(-np.array(self.direction))

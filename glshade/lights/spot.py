@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from glshade.document import Direction
+from glshade.errors import figure
 from glshade.lights import Array, Placed, direction_and_distance
 
 
@@ -29,7 +30,7 @@ class SpotLight(Placed):
         if isinstance(data, Mapping):
             inner, outer = data.get("inner"), data.get("outer", 30.0)
             if isinstance(inner, int | float) and isinstance(outer, int | float) and inner > outer:
-                yield ("inner",), f"{inner:g} must not be larger than outer, {outer:g}"
+                yield ("inner",), f"{figure(inner)} must not be larger than outer, {figure(outer)}"
 
     def uniforms(self, eye: Array) -> dict[str, Any]:
         axis, _ = direction_and_distance(-np.array(self.direction))

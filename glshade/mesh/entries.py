@@ -1,7 +1,8 @@
 """Entries: mesh files in the user's cache folder, in a form that needs no parser.
 
 An entry is a folder with the arrays of the meshes, the pictures that the file embeds, and `entry.json` with the parts and the
-state of every other file that was looked at.
+state of every other file that was looked at. `entry.json` also has checksums of the meshes and the pictures, and begins with a
+line that holds the checksum of the rest. An entry with a wrong checksum counts as missing.
 """
 
 from __future__ import annotations
@@ -27,16 +28,21 @@ def entry_of(key: str) -> Path:
 def recall(folder: Path) -> Contents | None:
     """Returns the contents of an entry; None if it does not exist, is damaged, or depends on a file that has changed."""
     try:
-        stored = json.loads((folder / "entry.json").read_bytes())
+        checksum, data = (folder / "entry.json").read_bytes().split(b"\n", 1)
+        if checksum.decode() != _checksum(data):
+            return None
+        stored = json.loads(data)
         contents = Contents()
         contents.parts, contents.warnings = stored["parts"], stored["warnings"]
         contents.dependencies = stored["dependencies"]
         if any(_state(Path(file), state) != state for file, state in contents.dependencies.items()):
             return None
-        for index, names in enumerate(stored["meshes"]):
-            arrays = {name: np.load(folder / f"{index}.{name}.npy", allow_pickle=False) for name in names}
-            contents.meshes.append(Mesh(**arrays))
-        if not all((folder / name).is_file() for name in stored["images"]):
+        for index, (names, digest) in enumerate(stored["meshes"]):
+            mesh = Mesh(**{name: np.load(folder / f"{index}.{name}.npy", allow_pickle=False) for name in names})
+            if mesh.digest != digest:
+                return None
+            contents.meshes.append(mesh)
+        if any(_checksum((folder / name).read_bytes()) != checksum for name, checksum in stored["images"].items()):
             return None
         model_of(contents, folder)  # raises if an index or a transform is wrong
     except Exception:  # a damaged entry may raise anything, and the mesh file itself can be read instead
@@ -83,26 +89,31 @@ def keep(contents: Contents, folder: Path) -> Path:
 
 def _write(contents: Contents, folder: Path) -> None:
     """Writes the files of an entry into a folder. Errors: OSError."""
-    names = []
+    meshes = []
     for index, mesh in enumerate(contents.meshes):
         arrays = {f.name: getattr(mesh, f.name) for f in fields(mesh) if getattr(mesh, f.name) is not None}
         for name, array in arrays.items():
             np.save(folder / f"{index}.{name}.npy", array)
-        names.append(list(arrays))
+        meshes.append((list(arrays), mesh.digest))
     _write_images(contents, folder)
     entry = {
-        "meshes": names,
+        "meshes": meshes,
         "parts": contents.parts,
-        "images": list(contents.images),
+        "images": {name: _checksum(data) for name, data in contents.images.items()},
         "dependencies": contents.dependencies,
         "warnings": contents.warnings,
     }
-    (folder / "entry.json").write_text(json.dumps(entry))
+    data = json.dumps(entry).encode()
+    (folder / "entry.json").write_bytes(f"{_checksum(data)}\n".encode() + data)
 
 
 def _write_images(contents: Contents, folder: Path) -> None:
     for name, data in contents.images.items():
         (folder / name).write_bytes(data)
+
+
+def _checksum(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()
 
 
 def _state(path: Path, recorded: str | None) -> str | None:

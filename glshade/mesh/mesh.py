@@ -34,7 +34,7 @@ _COLUMNS = {
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """An indexed triangle mesh; all arrays are contiguous and read-only.
+    """An indexed triangle mesh; all arrays are contiguous and read-only. An array that somebody could write to is copied.
 
     positions: (V, 3) float32, relative to `origin`.
     triangles: (T, 3) uint32, counter-clockwise seen from outside.
@@ -64,10 +64,10 @@ class Mesh:
 
     def __post_init__(self) -> None:
         def settle(name: str, dtype: type[Any], columns: int) -> None:
-            array = np.array(getattr(self, name), dtype=dtype, order="C", copy=None)
+            array = _own(np.array(getattr(self, name), dtype=dtype, order="C", copy=None))
             if array.ndim != 2 or array.shape[1] != columns:
                 raise AssetError(f"mesh {name} have shape {array.shape}, not (n, {columns})")
-            _freeze(self, name, array)
+            object.__setattr__(self, name, array)
 
         settle("positions", np.float32, 3)
         settle("triangles", np.uint32, 3)
@@ -78,7 +78,7 @@ class Mesh:
                     raise AssetError(f"mesh has {len(self.positions)} positions and {len(getattr(self, name))} {name}")
         if len(self.triangles) and int(self.triangles.max()) >= len(self.positions):
             raise AssetError(f"triangle index {self.triangles.max()} is out of range: {len(self.positions)} vertices")
-        _freeze(self, "origin", np.array(self.origin, dtype=np.float64).reshape(3))
+        object.__setattr__(self, "origin", _own(np.array(self.origin, dtype=np.float64).reshape(3)))
 
     @classmethod
     def build(
@@ -190,11 +190,16 @@ class Mesh:
         return bool(terms.sum() > 1e-12 * np.abs(terms).sum())
 
 
-def _freeze(mesh: Mesh, name: str, array: Array) -> None:
-    if array.flags.writeable:
-        array = array.view()
-        array.flags.writeable = False
-    object.__setattr__(mesh, name, array)
+def _own(array: Array) -> Array:
+    """Returns the array itself if nobody can write to it, as with the arrays of another mesh; else a read-only copy."""
+    owner: Any = array
+    while isinstance(owner, np.ndarray):
+        if owner.flags.writeable:
+            array = array.copy()
+            array.flags.writeable = False
+            break
+        owner = owner.base
+    return array
 
 
 def gather(mesh: Mesh, source: Array, corners: Array, normals: Float64 | None = None) -> Mesh:

@@ -64,7 +64,7 @@ def stamps(paths: Iterable[Path]) -> dict[Path, Stamp]:
     def stamp(path: Path) -> Stamp:
         try:
             stat = path.stat()
-        except OSError:
+        except (OSError, ValueError):  # the file is missing, or no file can have the name
             return None
         return stat.st_mtime_ns, stat.st_size
 

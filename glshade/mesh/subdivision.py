@@ -34,16 +34,18 @@ def subdivided(mesh: Mesh, levels: int) -> Mesh:
     return mesh
 
 
-def refined(mesh: Mesh, light: Light, tolerance: float) -> Mesh:
+def refined(mesh: Mesh, light: Light, tolerance: float, most: int | None = None) -> Mesh:
     """Returns the mesh, cut where the error of light that is interpolated between vertices exceeds the tolerance.
 
     light: a function that gives the light (V, C) at the vertices of a mesh, in C channels.
     tolerance: the largest error that is allowed, in the unit of the light.
+    most: optional, the number of triangles at which refinement ends if it is below LARGEST.
 
     An edge is cut if the error at one of PLACES is too large. All three edges of a triangle are cut if the error at its middle
     is too large. Each round looks only at the triangles that the round before has cut.
     """
     doubtful = np.ones(len(mesh.triangles), dtype=np.bool_)
+    most = LARGEST if most is None else min(most, LARGEST)
     for _ in range(DEEPEST):
         edges = Edges.of(mesh)
         shown = light(mesh)
@@ -59,7 +61,7 @@ def refined(mesh: Mesh, light: Light, tolerance: float) -> Mesh:
         off = np.abs(middle - shown[corners].mean(axis=1)).max(axis=1) > tolerance
         marked[edges.sides[doubtful][off]] = True
         marked = edges.together(marked)
-        if not marked.any() or len(mesh.triangles) + 2 * int(marked.sum()) > LARGEST:
+        if not marked.any() or len(mesh.triangles) + 2 * int(marked.sum()) > most:
             break
         cut = marked[edges.sides].any(axis=1)
         mesh = split(mesh, edges, marked)

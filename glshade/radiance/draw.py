@@ -120,6 +120,23 @@ class Draw:
         clip: Array = world @ self.clip_from_world[:, :3].T + self.clip_from_world[:, 3]
         return clip
 
+    @cached_property
+    def world_terms(self) -> Array:
+        """The sums (V, 3) of the absolute values of the terms that make up the vertices' positions relative to the eye.
+
+        Float32 sums are rounded relative to their terms.
+        """
+        matrix = np.abs(self.world_from_object)
+        result: Array = np.abs(self.instance.mesh.positions) @ matrix[:3, :3].T + matrix[:3, 3]
+        return result
+
+    @cached_property
+    def clip_terms(self) -> Array:
+        """The sums (V, 4) of the absolute values of the terms that make up the vertices' positions in clip space."""
+        matrix = np.abs(self.clip_from_world)
+        result: Array = self.world_terms @ matrix[:, :3].T + matrix[:, 3]
+        return result
+
 
 def draw_of(scene: Scene, assembly: Assembly, instance: Instance) -> Draw:
     """Returns the inputs of one instance, with the clip matrix of the whole picture. Errors: AssetError."""

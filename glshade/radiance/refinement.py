@@ -26,12 +26,17 @@ def refined_assembly(scene: Scene, assembly: Assembly) -> Assembly:
     Triangles are cut until the interpolated light differs from the light of `evaluate_surface` by less than the tolerance.
     """
 
+    left = scene.limits.max_triangles
+
     def refine(instance: Instance) -> Instance:
+        nonlocal left
         tolerance = instance.quality.refine
         if instance.rate != "gouraud" or tolerance is None:
             return instance
         draw = draw_of(scene, assembly, instance)
-        return replace(instance, mesh=ordered(refined(instance.mesh, lambda mesh: _light(draw, mesh), tolerance)))
+        mesh = refined(instance.mesh, lambda mesh: _light(draw, mesh), tolerance, left)
+        left -= len(mesh.triangles)
+        return replace(instance, mesh=ordered(mesh))
 
     return replace(assembly, instances=tuple(map(refine, assembly.instances)))
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +14,16 @@ from glshade.textures.texels import Texels
 from glshade.textures.texture import WrapMode
 
 Array = NDArray[Any]
+
+Rule = Literal["length", "largest", "sum"]
+# Name of a rule -> the number of texels (N,) that a pixel spans by that rule, from the changes of the texel coordinates to the
+# next pixel in the row and in the column (N, 2 each). Its logarithm is the level of detail. OpenGL 4.6 core, 8.14.1, defines
+# "length" (equation 8.8), and allows a driver everything between "largest" and "sum" (equation 8.11).
+RULES: Mapping[Rule, Callable[[Array, Array], Array]] = {
+    "length": lambda dx, dy: np.maximum(np.linalg.norm(dx, axis=1), np.linalg.norm(dy, axis=1)),
+    "largest": lambda dx, dy: np.maximum(np.abs(dx), np.abs(dy)).max(axis=1),
+    "sum": lambda dx, dy: np.maximum(np.abs(dx), np.abs(dy)).sum(axis=1),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,16 +68,16 @@ class Sampler:
         result: NDArray[np.float64] = np.array([self.widths[0], self.heights[0]]) / np.array(self.span)
         return result
 
-    def level(self, dx: Array, dy: Array) -> Array:
-        """Returns the level of detail (N,) of pixels; OpenGL 4.6, equations 8.8 and 8.10.
+    def level(self, dx: Array, dy: Array, rule: Rule = "length") -> Array:
+        """Returns the level of detail (N,) of pixels.
 
         dx: change of the texture coordinates from a pixel to the next one in its row (N, 2).
         dy: change of the texture coordinates from a pixel to the next one in its column (N, 2).
+        rule: optional; the rule by which it follows from them.
         """
         size = self.size.astype(dx.dtype)
-        longest = np.maximum(np.linalg.norm(dx * size, axis=1), np.linalg.norm(dy * size, axis=1))
         # A least change of 1e-30 texels per pixel keeps the logarithm finite. It is far below level 0.
-        result: Array = np.log2(np.maximum(longest, 1e-30))
+        result: Array = np.log2(np.maximum(RULES[rule](dx * size, dy * size), 1e-30))
         return result
 
     def sample(self, uv: Array, level: Array | None = None) -> Array:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.lights import FALLOFFS
-from glshade.radiance.draw import Draw
+from glshade.radiance.draw import Draw, Lamp
 from glshade.radiance.sampler import Sampler
 
 Array = NDArray[Any]
@@ -185,13 +185,33 @@ def evaluate_surface(draw: Draw, surface: Surface, material: SimpleNamespace | N
     v = (v + up * n) / np.sqrt(1 + 2 * HORIZON * up)
     v_local = local(v)
     for lamp in draw.lamps:
-        light = lamp.fields(dtype)
-        l, e = lamp.kind.illuminate(light, surface.position)
-        if lamp.falloff != "none":
-            r = np.maximum(np.linalg.norm(light.position - surface.position, axis=1), light.r_min)
-            e = e / (r ** FALLOFFS[lamp.falloff].power)[:, None]
+        l, e = _arriving(lamp, surface.position)
         total += e * draw.model.brdf_cos(m, local(l), v_local)
     return total
+
+
+def light_at(draw: Draw, position: Array) -> Array:
+    """Returns the light (N, 3) that arrives at positions (N, 3), as absolute values summed over all lights.
+
+    Light that depends on the normal is counted for that direction of the six axes where it is brightest.
+    """
+    total = np.broadcast_to(np.abs(draw.ambient), position.shape).copy()
+    axes = np.concatenate([np.eye(3), -np.eye(3)])
+    for lamp in draw.surrounds:
+        total += np.abs(lamp.kind.illuminate(lamp.fields(np.float64), axes)).max(axis=0)
+    for lamp in draw.lamps:
+        total += np.abs(_arriving(lamp, position)[1])
+    return total
+
+
+def _arriving(lamp: Lamp, position: Array) -> tuple[Array, Array]:
+    """Returns (l, e), (N, 3) each: the unit directions to a light, and its light perpendicular to them, at positions (N, 3)."""
+    light = lamp.fields(position.dtype)
+    l, e = lamp.kind.illuminate(light, position)
+    if lamp.falloff != "none":
+        r = np.maximum(np.linalg.norm(light.position - position, axis=1), light.r_min)
+        e = e / (r ** FALLOFFS[lamp.falloff].power)[:, None]
+    return l, e
 
 
 def _property(draw: Draw, surface: Surface) -> Array:

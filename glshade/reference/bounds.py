@@ -16,12 +16,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.radiance.draw import Draw
-from glshade.radiance.surface import Surface, alpha_of, at_vertices, evaluate_surface, material_of, toward_viewer
-from glshade.reference.freedom import LLVMPIPE, Freedom, U
+from glshade.radiance.surface import (
+    Surface,
+    alpha_of,
+    at_vertices,
+    evaluate_surface,
+    light_at,
+    material_of,
+    toward_viewer,
+)
+from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.inputs import Inputs
 from glshade.reference.interpolate import blend, weights
 from glshade.reference.planes import Planes
-from glshade.reference.raster import Fragments
+from glshade.reference.raster import Fragments, U
 from glshade.reference.shade import AT_CENTRE, by_draw, places, surface_at
 
 Array = NDArray[Any]
@@ -38,17 +46,24 @@ STEPS = 16 * 2 * U
 # A float32 sum of n numbers, added in any order, has an error of at most n U times the sum of their absolute values (Higham
 # 2002, section 4.2). STEPS covers the sum over this many lights; for more lights the allowed error grows with their number.
 SUMMED = STEPS / U
-# An absolute error that is always allowed [linear light]. Drivers flush denormal numbers (below 1.2e-38) to 0, and large
-# factors may magnify the lost amount. This little light is invisible.
-FLUSHED = 1e-30
+# The smallest normal float32 number. Drivers flush smaller numbers to 0.
+TINY = 2.0**-126
+# A flushed number may be multiplied by the light that arrives and by factors of the model up to this. The largest is the peak
+# of a narrow lobe, 1 / alpha^2 = 1e8 for the narrowest, and the others stay below 100.
+MAGNIFIED = 1e10
 # The level of detail is sampled at this many values, from its least possible to its largest possible value.
 LEVELS = 9
 # A texture coordinate is sampled at this many values, from one end of its error to the other.
 SHIFTS = 5
-# The errors of the normal's three components make a box of possible normals. If the light over this box deviates from a linear
+# The errors of a vector's three components make a box of possible vectors. If the light over this box deviates from a linear
 # function by more than this share of its range, it is sampled at LEVELS points along each diagonal of the box, not only at the
 # corners.
 BENT = 0.1
+# A light counts as close to a box of positions if its distance is below this multiple of the box's largest error: the light
+# then changes over the box by more than a linear function tells.
+CLOSE = 16.0
+# The number of times that the search for the brightest and the darkest point of the box follows each axis.
+CLIMBS = 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +76,7 @@ class Bounds:
     level: the part (N, 3) of below and above that comes from the level of detail of textures.
     rounding: the largest difference (N, 3) that was found between the light computed in float32 and in float64.
     magnitude: the absolute value (N, 3) of the light. With more than SUMMED lights it is multiplied by their number / SUMMED.
+    arriving: the absolute value (N, 3) of the light that arrives at the surface from all lights.
     alpha: alpha (N,), computed in float64.
     alpha_low: the least possible alpha (N,).
     alpha_high: the largest possible alpha (N,).
@@ -72,13 +88,15 @@ class Bounds:
     level: Array
     rounding: Array
     magnitude: Array
+    arriving: Array
     alpha: Array
     alpha_low: Array
     alpha_high: Array
 
     def arithmetic(self, scale: float) -> Array:
         """The error tau (N, 3) of the shading's arithmetic. scale: the picture's brightest value, at most 1."""
-        result: Array = AGAIN * self.rounding + STEPS * np.maximum(self.magnitude, scale) + FLUSHED
+        flushed = TINY * (1 + MAGNIFIED * self.arriving)
+        result: Array = AGAIN * self.rounding + STEPS * np.maximum(self.magnitude, scale) + flushed
         return result
 
     def interval(self, scale: float) -> tuple[Array, Array]:
@@ -283,34 +301,12 @@ def _spread(draw: Draw, evaluate: Callable[..., Array], surface: Surface, errors
         np.add(below, np.maximum(value - (np.minimum.reduce(values) - margin), 0), out=below)
         np.add(above, np.maximum(np.maximum.reduce(values) + margin - value, 0), out=above)
 
-    if errors.normal is not None:
-        # All corners of the box of possible normals are tried, so that a lobe is evaluated on both sides of its horizon.
-        at_corners = []
-        for number, signs in enumerate(product((-1.0, 1.0), repeat=3)):
-            turned = replace(surface, normal=surface.normal + np.array(signs) * errors.normal)
-            at_corners.append(evaluate(draw, turned, material))
-            # Two opposite corners are enough to see whether the rounding error is larger beside the exact normal.
-            if number in (1, 6):
-                rounding = np.maximum(rounding, np.abs(evaluate(draw, _float32(turned)) - at_corners[-1]))
-        low, high = np.minimum.reduce(at_corners), np.maximum.reduce(at_corners)
-        # If the values at opposite corners are not symmetric about the central value, a peak or a horizon may lie inside the
-        # box.
-        bend = np.maximum.reduce([np.abs(at_corners[k] + at_corners[7 - k] - 2 * value) for k in range(4)])
-        bent = np.flatnonzero((bend > BENT * (high - low) + FLUSHED).any(axis=1))
-        if len(bent):
-            points, error = _take(surface, bent), errors.normal[bent]
-            for signs in product((1.0,), (-1.0, 1.0), (-1.0, 1.0)):
-                shifts = _spaced(-error, error, LEVELS)
-                along = [evaluate(draw, replace(points, normal=points.normal + np.array(signs) * shift)) for shift in shifts]
-                margin = _between(along)
-                low[bent] = np.minimum(low[bent], np.minimum.reduce(along) - margin)
-                high[bent] = np.maximum(high[bent], np.maximum.reduce(along) + margin)
-        widen([low, high])
-    for name in ("position", "tangent"):
+    for name in ("normal", "position", "tangent"):
         error = getattr(errors, name)
-        for axis in range(0 if error is None else error.shape[1]):
-            moves = [_moved(surface, name, axis, sign * error[:, axis]) for sign in (-1.0, 1.0)]
-            widen([evaluate(draw, moved, material) for moved in moves])
+        if error is not None:
+            low, high, uncertain = over_box(draw, evaluate, surface, name, error, value, material)
+            rounding = np.maximum(rounding, uncertain)
+            widen([low, high])
     for axis, error in enumerate([] if errors.uv is None else errors.uv.T):
         # Filtered textures have a kink at the middle of every texel, so the ends of the error are not enough.
         shifts = _spaced(-error, error, SHIFTS)
@@ -330,8 +326,84 @@ def _spread(draw: Draw, evaluate: Callable[..., Array], surface: Surface, errors
         "above": above,
         "level": level,
         "rounding": rounding,
+        "arriving": light_at(draw, surface.position),
         "magnitude": np.abs(value) * max(1.0, len(draw.lamps + draw.surrounds) / SUMMED),
     }
+
+
+def over_box(
+    draw: Draw, evaluate: Callable[..., Array], surface: Surface, name: str, error: Array, value: Array, material: Any
+) -> tuple[Array, Array, Array]:
+    """Returns (the least light, the largest light, the largest rounding error), each (N, 3), over a box of possible attributes.
+
+    The errors of a vector's three components make a box round its exact value.
+    draw, evaluate, surface: as in _spread.
+    name: the attribute: normal, position or tangent.
+    error: the errors (N, 3) of its first three components, half the sides of the box.
+    value: the light (N, 3) at the exact attribute.
+    material: the material of the surface's points, which does not depend on the attribute.
+    """
+
+    def moved(points: Surface, by: Array) -> Surface:
+        vector = getattr(points, name).copy()
+        vector[:, :3] += by
+        return replace(points, **{name: vector})
+
+    rounding = np.zeros_like(value)
+    diagonals = [error * (1.0, *signs) for signs in product((-1.0, 1.0), repeat=2)]
+    # All corners of the box of normals are tried, so that a lobe is evaluated on both sides of its horizon. Positions and
+    # tangents seldom matter as much, and a linear function changes by the sum of its changes along the axes.
+    directions = diagonals if name == "normal" else [error * (np.arange(3) == axis) for axis in range(3)]
+    ends = []
+    for number, direction in enumerate(directions):
+        opposite = [moved(surface, sign * direction) for sign in (-1.0, 1.0)]
+        ends.append(np.stack([evaluate(draw, end, material) for end in opposite]))
+        # Two opposite corners are enough to see whether the rounding error is larger beside the exact normal.
+        if name == "normal" and number == 2:
+            single = np.stack([evaluate(draw, _float32(end)) for end in opposite])
+            rounding = np.abs(single - ends[-1]).max(axis=0)
+    if name == "normal":
+        low, high = np.minimum.reduce(ends).min(axis=0), np.maximum.reduce(ends).max(axis=0)
+    else:
+        low = value - sum(np.maximum(value - pair.min(axis=0), 0) for pair in ends)
+        high = value + sum(np.maximum(pair.max(axis=0) - value, 0) for pair in ends)
+    # If the values at opposite ends are not symmetric about the central value, a peak or a horizon may lie inside the box.
+    bend = np.maximum.reduce([np.abs(pair.sum(axis=0) - 2 * value) for pair in ends])
+    curved = (bend > BENT * (high - low) + TINY).any(axis=1)
+    # A light within or beside a box of positions makes a peak that may lie symmetrically between the corners.
+    places = [lamp.values["position"] for lamp in draw.lamps if "position" in lamp.values] if name == "position" else []
+    towards = [place - surface.position for place in places]
+    for toward in towards:
+        curved |= np.linalg.norm(toward, axis=1) < CLOSE * error.max(axis=1)
+    bent = np.flatnonzero(curved)
+    if len(bent):
+        points, half = _take(surface, bent), error[bent]
+
+        def sample(centre: Array, direction: Array) -> tuple[Array, Array]:
+            """Samples the line from centre - direction to centre + direction: (offsets, light), (LEVELS, N, 3) each."""
+            offsets = _spaced(centre - direction, centre + direction, LEVELS)
+            along = [evaluate(draw, moved(points, offset)) for offset in offsets]
+            margin = _between(along)
+            low[bent] = np.minimum(low[bent], np.minimum.reduce(along) - margin)
+            high[bent] = np.maximum(high[bent], np.maximum.reduce(along) + margin)
+            return np.stack(offsets), np.stack(along)
+
+        def extreme(offsets: Array, along: Array, sign: float) -> Array:
+            """The offset (N, 3) at which sign times the light, summed over the channels, is largest."""
+            best = (sign * along.sum(axis=2)).argmax(axis=0)
+            found: Array = offsets[best, np.arange(len(best))]
+            return found
+
+        lines = [sample(np.zeros_like(half), diagonal[bent]) for diagonal in diagonals]
+        lines += [sample(np.zeros_like(half), np.clip(toward[bent], -half, half)) for toward in towards]
+        offsets, along = (np.concatenate(parts) for parts in zip(*lines, strict=True))
+        # From the brightest and from the darkest of these points, lines along the axes lead to a peak or to a dip.
+        for sign in (-1.0, 1.0):
+            centre = extreme(offsets, along, sign)
+            for axis in list(range(3)) * CLIMBS:
+                line = half * (np.arange(3) == axis)
+                centre = extreme(*sample(np.where(line > 0, 0.0, centre), line), sign)
+    return low, high, rounding
 
 
 def _alphas(draw: Draw, surface: Surface, errors: _Errors, driver: Freedom) -> Array:
@@ -371,9 +443,9 @@ def _levels(
     driver: the errors of the driver's fixed functions.
     """
     assert surface.footprint is not None
-    samplers = draw.pictures
-    exact = [sampler.level(*surface.footprint) for sampler in samplers]
-    if max(level.max(initial=-np.inf) for level in exact) < -1:
+    exact = [sampler.level(*surface.footprint) for sampler in draw.pictures]
+    # The driver's level may be larger than the exact one: by up to 1 by the rule "sum", and by another 1 because of differences.
+    if max(level.max(initial=-np.inf) for level in exact) < (-2 if "sum" in driver.rules else -1):
         return None
     vertices, place = np.unique(draw.triangles[fragments.triangle], return_inverse=True)
     at_corners = at_vertices(draw, vertices, np.float64).uv
@@ -384,11 +456,13 @@ def _levels(
         (i, j): blend(weights(draw, fragments.triangle, x + i, y + j, size, derivatives=False).values, corner)
         for i, j in product((0, 1), repeat=2)
     }
-    least, largest = np.zeros(len(x)), np.zeros(len(x))
-    for sampler, level in zip(samplers, exact, strict=True):
-        for i, j in product((0, 1), repeat=2):
-            difference = sampler.level(uv[1, j] - uv[0, j], uv[i, 1] - uv[i, 0]) - level
-            least, largest = np.minimum(least, difference), np.maximum(largest, difference)
+    footprints = [surface.footprint, *((uv[1, j] - uv[0, j], uv[i, 1] - uv[i, 0]) for i, j in product((0, 1), repeat=2))]
+    differences = [
+        sampler.level(dx, dy, rule) - level
+        for sampler, level in zip(draw.pictures, exact, strict=True)
+        for (dx, dy), rule in product(footprints, driver.rules)
+    ]
+    least, largest = np.minimum.reduce(differences), np.maximum.reduce(differences)
     return least - driver.level, largest + driver.level
 
 

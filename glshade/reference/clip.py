@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 # A point is inside a plane where plane . (x, y, z, w) >= 0. The order is left, right, top, bottom (y points down, as in the
 # picture), far (depth 0) and near (depth 1).
 PLANES = np.array([[1, 0, 0, 1], [-1, 0, 0, 1], [0, 1, 0, 1], [0, -1, 0, 1], [0, 0, 1, 0], [0, 0, -1, 1]], dtype=np.float64)
+# The bits of the outcode that stand for the near and the far plane.
+DEPTH = 0b110000
 # The size of the guard band: a triangle is clipped at the left, right, top and bottom only if it reaches beyond this multiple
 # of the view. Clipping would move the triangle's edges, because its new corners are snapped too. Drivers also have a guard
 # band.

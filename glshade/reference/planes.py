@@ -9,16 +9,17 @@ from numpy.typing import NDArray
 
 from glshade.radiance.draw import Draw
 from glshade.reference import clip
-from glshade.reference.freedom import LLVMPIPE, Freedom, U
+from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.inputs import Inputs
-from glshade.reference.raster import MARGIN, SUBPIXELS, Fragments
+from glshade.reference.raster import MARGIN, SUBPIXELS, Fragments, U
 from glshade.reference.shade import AT_CENTRE, by_draw, places
+from glshade.reference.slivers import Clipped, slimness
 
 Array = NDArray[Any]
 
 
-# An edge within this distance of a pixel's centre counts as near [pixels]. The distance is the margin of coverage and two
-# snapping steps for the corners of the edge.
+# An edge within this distance of a pixel's centre counts as near where the driver's snapped corners are not known [pixels]. The
+# distance is the margin of coverage and two snapping steps for the corners of the edge.
 NEAR = (MARGIN + 2) / SUBPIXELS
 # A triangle whose height is less than this may turn over, because snapping moves each corner by up to one step [pixels].
 FLAT = 4 / SUBPIXELS
@@ -33,67 +34,98 @@ def depth_slack(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE
     for draw, indices, part in by_draw(inputs, fragments):
         planes = Planes(draw, part, inputs.size, driver)
         error = planes.depth_error()
-        # A triangle that is seen edge-on may have any depth at a pixel.
-        result[indices] = np.where(planes.flat, 1.0, error) + 4 * U * np.abs(part.depth)
+        # A triangle that is seen edge-on may have any depth of its corners at a pixel, or be drawn with none at all.
+        corner = planes.depths[planes.place]
+        edge_on = planes.flat | planes.thin[planes.place]
+        error = np.where(edge_on, np.maximum(error, np.abs(part.depth[:, None] - corner).max(axis=1)), error)
+        result[indices] = np.where(planes.flat, np.maximum(error, 1.0), error) + 4 * U * np.abs(part.depth)
     return result
 
 
-def may_turn(inputs: Inputs, fragments: Fragments) -> NDArray[np.bool_]:
+def may_turn(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> NDArray[np.bool_]:
     """Whether each fragment (N,) may show either side, because snapping may turn over its thin triangle."""
     result = np.zeros(len(fragments), dtype=np.bool_)
     for draw, indices, part in by_draw(inputs, fragments):
         if draw.instance.back_faces:
-            planes = Planes(draw, part, inputs.size, LLVMPIPE)
+            planes = Planes(draw, part, inputs.size, driver)
             result[indices] = planes.thin[planes.place]
     return result
 
 
-def is_sealed(inputs: Inputs, fragments: Fragments) -> NDArray[np.bool_]:
+def is_sealed(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> NDArray[np.bool_]:
     """Whether each partial fragment (N,) belongs to a surface that covers its pixel's centre without a gap.
 
     Two triangles on either side of a shared edge leave no gap there, whichever of them the driver draws. So a fragment is
-    sealed if each edge near its pixel's centre has a sealed fragment of that pixel on its other side.
+    sealed if each edge near its pixel's centre has a sealed fragment of that pixel on its other side. A triangle that snapping
+    may turn over belongs to a surface of either facing: the surface is continuous, however its corners are snapped, so where a
+    triangle is turned over, its neighbours overlap.
     """
     sealed = np.zeros(len(fragments), dtype=np.bool_)
-    owners, keys, directions = [], [], []
+    owners, possible, twins, edges = [], [], [], []
+    count = 0
     for number, draw in enumerate(inputs.draws):
         indices = np.flatnonzero(fragments.draw == number)
         if not len(indices):
             continue
         part = fragments.take(indices)
-        planes = Planes(draw, part, inputs.size, LLVMPIPE)
-        # Row i of G is the line through the edge opposite to corner i.
-        lines = planes.G[planes.place]
-        steepness = np.hypot(lines[..., 0], lines[..., 1])
-        near = np.abs(np.einsum("nij,nj->ni", lines, planes.at)) <= NEAR * steepness
-        sealed[indices] = near.any(axis=1) & ~planes.flat & ~planes.thin[planes.place]
+        planes = Planes(draw, part, inputs.size, driver)
+        thin = planes.thin[planes.place]
+        # The far edge of a thin triangle counts as near, too.
+        reserve = np.where(thin, FLAT, 0.0)
+        distance = NEAR + planes.reach.max(axis=1)
+        near = np.where(
+            (planes.whole[planes.place] & (distance < NEAR + 1 / SUBPIXELS))[:, None],
+            planes.snapped_distance() <= (MARGIN / SUBPIXELS + reserve)[:, None],
+            planes.distance() <= (distance + reserve)[:, None],
+        )
+        # Where a driver clips a triangle, the new edge is also only drawn to within the distance of the picture's border.
+        centre = planes.at[:, :2]
+        border = planes.clipped[planes.place] & (np.minimum(centre, inputs.size - centre) <= distance[:, None]).any(axis=1)
         vertices, place = np.unique(planes.corners, return_inverse=True)
         # Vertices at the same position are the same corner, whatever their other attributes are.
         _, position_id = np.unique(draw.instance.mesh.positions[vertices] + 0.0, axis=0, return_inverse=True)
         corner = position_id.reshape(-1)[place.reshape(-1, 3)][planes.place]
+        # Each fragment takes part with the facing that it shows, and with the other one if it may be turned over.
+        turned = np.flatnonzero(thin) if draw.instance.back_faces else np.empty(0, dtype=np.intp)
+        which = np.concatenate([np.arange(len(indices)), turned])
+        twin = np.full(len(which), -1)
+        twin[turned], twin[len(indices) :] = count + len(indices) + np.arange(len(turned)), count + turned
+        twins.append(twin)
+        front = np.concatenate([part.front, ~part.front[turned]])
+        owners.append(indices[which])
+        possible.append((near.any(axis=1) & ~border & ~planes.flat)[which])
         for k in range(3):
-            with_edge = np.flatnonzero(near[:, k])
-            a, b = corner[with_edge, (k + 1) % 3], corner[with_edge, (k + 2) % 3]
-            owners.append(indices[with_edge])
-            draws = np.full(len(with_edge), number)
-            keys.append(np.column_stack([part.pixel[with_edge], draws, np.minimum(a, b), np.maximum(a, b)]))
+            with_edge = np.flatnonzero(near[which, k])
+            a, b = corner[which[with_edge], (k + 1) % 3], corner[which[with_edge], (k + 2) % 3]
+            pixel = part.pixel[which[with_edge]]
             # Neighbours of the same facing run along their shared edge in opposite directions.
-            directions.append((a < b) == part.front[with_edge])
+            direction = (a < b) == front[with_edge]
+            draws = np.full(len(with_edge), number)
+            edges.append(np.column_stack([count + with_edge, direction, pixel, draws, np.minimum(a, b), np.maximum(a, b)]))
+        count += len(which)
     if not owners:
         return sealed
-    owner, direction = np.concatenate(owners), np.concatenate(directions)
-    _, edge = np.unique(np.concatenate(keys), axis=0, return_inverse=True)
+    table = np.concatenate(edges)
+    holder, direction = table[:, 0], table[:, 1]
+    _, edge = np.unique(table[:, 2:], axis=0, return_inverse=True)
     edge = edge.reshape(-1)
+    kept, twin = np.concatenate(possible), np.concatenate(twins)
     # All candidates count as sealed at first. Those with an edge that has no sealed fragment on its other side are removed,
-    # until every remaining one is sealed.
+    # until every remaining one is sealed. A fragment's own twin, which runs along the edge the other way, does not count.
     while True:
-        current = sealed[owner]
-        both = np.zeros((int(edge.max(initial=-1)) + 1, 2), dtype=np.bool_)
-        both[edge[current], direction[current].astype(np.intp)] = True
-        lonely = current & ~both[edge].all(axis=1)
+        current = kept[holder]
+        number_of = np.zeros((int(edge.max(initial=-1)) + 1, 2), dtype=np.intp)
+        np.add.at(number_of, (edge[current], direction[current]), 1)
+        others = number_of[edge, 1 - direction] - ((twin >= 0) & kept[twin])[holder]
+        lonely = current & (others <= 0)
         if not lonely.any():
+            sealed[np.concatenate(owners)[kept]] = True
             return sealed
-        sealed[owner[lonely]] = False
+        kept[holder[lonely]] = False
+
+
+# The largest factor by which needle-like triangles may multiply the range of an attribute. All results are then finite.
+LARGEST = 1e6
 
 
 class Planes:
@@ -116,11 +148,15 @@ class Planes:
     world: the sums (T, 3, 3) of the absolute values of the terms that make up the corners' world positions.
     reach: the error (N, 2) of a fragment's position, relative to its triangle [pixels].
     z: clip z (T, 3) of the corners.
+    depths: the depths (T, 3) of the corners, from 0 to 1.
     depth_terms: the sums (N, 2) of the absolute values of the terms that make up clip z and w.
-    over_w: 1 / w (T, 3) at the corners.
-    slim: longest side^2 / (2 area) of each triangle (T,), a factor of the errors of needle-like triangles.
-    behind: whether (T,) a corner lies beyond the near or far plane.
+    drawn: the corners (T, E, 3) of the parts of the triangles that are drawn, as (x, y, 1) [pixels]. A clipped triangle may
+        have up to 9; others repeat their last one.
+    slim: the slimness (N,) of the triangle that a driver draws at the fragment (slivers.py).
+    clipped: whether (T,) the driver clips the triangle.
     thin: whether (T,) snapping may turn the triangle over.
+    window: x, y of the corners (T, 3, 2) in the picture [pixels]; 0 where a corner lies beyond the near or far plane.
+    whole: whether (T,) the reference covers pixels by the whole triangle, and does not clip it (raster.py).
     """
 
     def __init__(self, draw: Draw, fragments: Fragments, size: tuple[int, int], driver: Freedom) -> None:
@@ -151,27 +187,56 @@ class Planes:
         self.w = 1 / np.where(self.flat, 1.0, over_w)
         self.B_size = np.einsum("ij,ij->i", np.abs(self.B), self.at)
         # Matrix products are rounded relative to their terms, and window positions relative to the window's size.
-        matrix = np.abs(draw.world_from_object)
-        self.world = np.abs(draw.instance.mesh.positions[self.corners]) @ matrix[:3, :3].T + matrix[:3, 3]
-        project = np.abs(draw.clip_from_world)
-        terms = (self.world @ project[:, :3].T + project[:, 3]).max(axis=1)[self.place]
+        self.world = draw.world_terms[self.corners]
+        terms = draw.clip_terms[self.corners].max(axis=1)[self.place]
         screen = np.abs(self.at[:, :2] / half - 1)
         moved = half * (terms[:, :2] + screen * terms[:, 3:]) / np.abs(self.w)[:, None]
         self.reach = driver.window * U * (max(size) + moved) + driver.snap
         self.z, self.depth_terms = at[..., 2], terms[:, 2:]
-        # The plane equation of a needle-like triangle is a quotient of small differences. Its error is L^2 / (2 area)
-        # roundings, where L is the longest side.
-        behind = (clip.outside(at) & 0b110000 != 0).any(axis=1)
+        code = clip.outside(at)
+        behind = (code & clip.DEPTH != 0).any(axis=1)
+        self.clipped = (code != 0).any(axis=1) if driver.clips else behind
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            window = rows[..., :2] / w[..., None]
-            sides = window[:, [1, 2, 0]] - window
-            double = np.abs(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0])
-            longest = (sides**2).sum(axis=2).max(axis=1)
-            slim = longest / double
-            thin = double <= FLAT * np.sqrt(longest)
-            self.over_w = 1 / w
-        self.slim = np.where(behind | ~np.isfinite(slim), 1.0, slim)
-        self.behind, self.thin = behind, thin & ~behind
+            window = np.where(behind[:, None, None], 0.0, rows[..., :2] / w[..., None])
+            self.depths = np.nan_to_num(np.clip(self.z / w, 0, 1))
+        self.window = window
+        self.whole = ~behind & (clip.outside(at, clip.GUARDED) == 0).all(axis=1)
+        slim = slimness(window)
+        with np.errstate(divide="ignore"):
+            # The height of a triangle is its longest side divided by its slimness.
+            self.thin = np.sqrt(((np.roll(window, -1, axis=1) - window) ** 2).sum(axis=2).max(axis=1)) <= FLAT * slim
+        self.thin &= ~behind
+        self.slim = slim[self.place]
+        self.drawn = np.concatenate([window, np.ones((*window.shape[:2], 1))], axis=2)
+        cut = np.flatnonzero(self.clipped)
+        if len(cut):
+            parts = Clipped.of(at[cut], size)
+            corners = parts.window.shape[1]
+            self.drawn = self.drawn[:, np.minimum(np.arange(corners), 2)]
+            self.drawn[cut, :, :2] = parts.window
+            row = np.full(len(at), -1)
+            row[cut] = np.arange(len(cut))
+            which = np.flatnonzero(row[self.place] >= 0)
+            self.slim[which] = parts.slimness(row[self.place[which]], self.at[which, :2], MARGIN / SUBPIXELS)
+
+    def distance(self) -> Array:
+        """The distances (N, 3) of the fragments' centres from the edges' lines [pixels]. Edge i is opposite corner i."""
+        lines = self.G[self.place]
+        steepness = np.hypot(lines[..., 0], lines[..., 1])
+        # An edge without a length is near everything.
+        result: Array = np.abs(np.einsum("nij,nj->ni", lines, self.at)) / np.where(steepness > 0, steepness, np.inf)
+        return result
+
+    def snapped_distance(self) -> Array:
+        """As `distance`, with corners snapped as for coverage. Both triangles at an edge have the same distance from it."""
+        window = np.rint(self.window * SUBPIXELS) / SUBPIXELS
+        start, end = window[:, [1, 2, 0]], window[:, [2, 0, 1]]
+        side = (end - start)[self.place]
+        away = self.at[:, None, :2] - start[self.place]
+        length = np.hypot(side[..., 0], side[..., 1])
+        area = np.abs(side[..., 0] * away[..., 1] - side[..., 1] * away[..., 0])
+        result: Array = area / np.where(length > 0, length, np.inf)
+        return result
 
     def errors(self, corners: Array, vertex: Array | float) -> Array:
         """The errors (N, C) of interpolated attributes at the fragments.
@@ -186,11 +251,13 @@ class Planes:
         error = self.driver.plane * U * w * (size + np.abs(value) * self.B_size[:, None])
         slope = np.abs(planes[..., :2] - value[..., None] * self.B[:, None, :2])
         error += np.abs(w) * np.einsum("ncj,nj->nc", slope, self.reach) + 2 * U * np.abs(value)
+        weight = np.abs(w * np.einsum("nij,nj->ni", self.G[self.place], self.at))
+        needle = self._needle(np.einsum("tic,tij->tcj", corners, self.G), value)
+        # Errors at the corners are interpolated as the attribute is. Beyond the triangle they are extrapolated, as slopes are.
+        error += np.abs(w) * weight.sum(axis=1, keepdims=True) * needle
+        vertex = np.broadcast_to(vertex, corners.shape)
+        error += np.einsum("ni,nic->nc", weight, vertex[self.place])
         span = np.ptp(corners, axis=1)
-        with np.errstate(invalid="ignore", over="ignore"):
-            needle = self.slim[:, None] * np.where(self.behind[:, None], span, np.ptp(corners * self.over_w[..., None], axis=1))
-        error += self.driver.plane * U * np.where(self.behind[self.place], 1.0, self.w)[:, None] * needle[self.place]
-        error += np.broadcast_to(vertex, corners.shape).max(axis=1)[self.place]
         result: Array = np.where(self.flat[:, None], span[self.place], error)
         return result
 
@@ -200,6 +267,22 @@ class Planes:
         size = np.einsum("nj,nj->n", np.abs(plane), self.at)
         steepness = np.einsum("nj,nj->n", np.abs(plane[:, :2]), self.reach)
         depth = np.einsum("nj,nj->n", plane, self.at)
+        needle = self._needle(np.einsum("ti,tij->tj", self.z, self.G)[:, None], np.zeros((len(depth), 1)))[:, 0]
         corner = (self.depth_terms[:, 0] + np.abs(depth) * self.depth_terms[:, 1]) / np.abs(self.w)
-        result: Array = U * (self.driver.plane * size + self.driver.window * corner) + steepness
+        result: Array = U * (self.driver.plane * size + self.driver.window * corner) + steepness + needle
+        return result
+
+    def _needle(self, planes: Array, value: Array) -> Array:
+        """The errors (N, C) of attributes / w that needle-like triangles cause.
+
+        The slopes of a plane equation are quotients. Their numerators and denominators are small differences in a needle-like
+        triangle, and their error over the length of the triangle is its slimness times a rounding of the attribute's range.
+        planes: the plane equations (T, C, 3) of the attributes / w.
+        value: the values (N, C) of the attributes, which the error of 1 / w is multiplied by.
+        """
+        span = np.ptp(np.einsum("tcj,tej->tec", planes, self.drawn), axis=1)[self.place]
+        over_w = np.ptp(np.einsum("tj,tej->te", self.G.sum(axis=1), self.drawn), axis=1)[self.place]
+        # A triangle without an area would have an infinite factor.
+        factor = np.minimum(self.driver.plane * U * self.slim, LARGEST)
+        result: Array = factor[:, None] * (span + np.abs(value) * over_w[:, None])
         return result

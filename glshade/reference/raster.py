@@ -31,6 +31,10 @@ HALF = SUBPIXELS // 2
 # to float32 before it snaps them, which may move the corners and the edges between them by one step. The other two are a
 # reserve.
 MARGIN = 3.0
+# The largest relative error of one float32 rounding.
+U = 2.0**-24
+# The error of a vertex's window position [roundings].
+WINDOW = 2.0
 # The numbers of triangles and of candidate pixels that are processed at once. They make arrays of about 10 MB, which use the
 # processor's caches better than larger arrays.
 TRIANGLES = 1 << 17
@@ -150,7 +154,10 @@ def _rasterise(draw: Draw, number: int, size: tuple[int, int], window: Box, marg
     """
     code = clip.outside(draw.clip)
     # Triangles must be clipped if they reach beyond the near or far plane, or beyond the guard band at the sides.
-    cut = (clip.outside(draw.clip, clip.GUARDED) != 0) | (code & 0b110000 != 0)
+    cut = (clip.outside(draw.clip, clip.GUARDED) != 0) | (code & clip.DEPTH != 0)
+    if margin:
+        # A driver may also clip triangles that reach just beyond the sides. That matters where it draws the new edge displaced.
+        cut |= (code != 0) & (_displacement(draw.clip_terms, draw.clip[:, None], size) > 0)
     snapped = _snapped(np.where(cut[:, None], (0.0, 0.0, 0.0, 1.0), draw.clip), size)
     for start in range(0, len(draw.triangles), TRIANGLES):
         triangles = draw.triangles[start : start + TRIANGLES]
@@ -159,14 +166,17 @@ def _rasterise(draw: Draw, number: int, size: tuple[int, int], window: Box, marg
         a, b, c = triangles[possible].T
         crossing = cut[a] | cut[b] | cut[c]
         whole = possible[~crossing]
-        pieces = [(snapped[triangles[whole]], whole)]
+        pieces = [(snapped[triangles[whole]], draw.clip[triangles[whole]] if margin else None, whole)]
         if crossing.any():
             broken = possible[crossing]
             polygons, corners = clip.cut(draw.clip[triangles[broken]])
             left = corners >= 3
-            pieces.append((_snapped(polygons[left], size), broken[left]))
-        for polygons, which in pieces:
-            for index, x, y, covered, partial, front in _cover(polygons, window, draw, margin):
+            pieces.append((_snapped(polygons[left], size), polygons[left] if margin else None, broken[left]))
+        for polygons, exact, which in pieces:
+            displaced = np.zeros(len(which))
+            if exact is not None:
+                displaced = _displacement(draw.clip_terms[triangles[which]].max(axis=1), exact, size)
+            for index, x, y, covered, partial, front in _cover(polygons, window, draw, margin, displaced):
                 triangle = which[index] + start
                 depth = weights(draw, triangle, x + 0.5, y + 0.5, size, derivatives=False).depth
                 yield Fragments(
@@ -191,8 +201,25 @@ def _snapped(points: Array, size: tuple[int, int]) -> Array:
     return result
 
 
+def _displacement(terms: Array, corners: Array, size: tuple[int, int]) -> Array:
+    """How far (P,) a driver may draw the corners of polygons beside their exact places [1/256 pixel], less one step.
+
+    MARGIN allows for the one step. Only the corners of a polygon that reaches far beyond the view are displaced by more: they
+    are computed from coordinates that are much larger than w.
+    terms: the sums (P, 4) of the absolute values of the terms that make up the coordinates.
+    corners: the corners (P, E, 4) in clip space.
+    size: width and height of the whole picture [pixels].
+    """
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        w = np.abs(corners[..., 3:])
+        screen = np.abs(corners[..., :2]) / w
+        moved = (terms[:, None, :2] + screen * terms[:, None, 3:]) / w * (0.5 * SUBPIXELS * np.array(size))
+    result: Array = np.maximum(WINDOW * U * moved.max(axis=(1, 2)) - 1, 0)
+    return result
+
+
 def _cover(
-    polygons: Array, window: Box, draw: Draw, margin: float
+    polygons: Array, window: Box, draw: Draw, margin: float, displaced: Array
 ) -> Iterator[tuple[Indices, Indices, Indices, Flags, Flags, Flags]]:
     """Yields (polygon, x, y, covered, partial, front) of the pixels in convex polygons, in batches, ordered by polygon.
 
@@ -200,7 +227,9 @@ def _cover(
     window: x, y, width and height of the part that is rendered [pixels].
     draw: the instance that they belong to.
     margin: as for rasterise [1/256 pixel].
+    displaced: how far (P,) a driver may draw each polygon's corners beside their places, beyond the margin [1/256 pixel].
     """
+    margins = margin + displaced
     following = np.roll(polygons, -1, axis=1)
     across, down = following[..., 0] - polygons[..., 0], following[..., 1] - polygons[..., 1]
     # Twice the area, from vectors relative to the first corner, which avoids the subtraction of large numbers.
@@ -214,18 +243,18 @@ def _cover(
         drawn &= front
     if margin:
         # A triangle lower than two snapping steps may turn over, or gain an area, when a corner moves by one step.
-        thin = np.abs(area) <= 2 * length.max(axis=1)
+        thin = np.abs(area) <= (2 + displaced) * length.max(axis=1)
         front |= thin & (not draw.instance.back_faces)
         drawn |= thin
-    low = np.ceil((polygons.min(axis=1) - margin - HALF) / SUBPIXELS)
-    high = np.floor((polygons.max(axis=1) + margin - HALF) / SUBPIXELS)
+    low = np.ceil((polygons.min(axis=1) - margins[:, None] - HALF) / SUBPIXELS)
+    high = np.floor((polygons.max(axis=1) + margins[:, None] - HALF) / SUBPIXELS)
     corner, size = np.array(window[:2]), np.array(window[2:])
     low, high = np.maximum(low, corner), np.minimum(high, corner + size - 1)
     kept = np.flatnonzero(drawn & (low <= high).all(axis=1))
     low, high, front = low[kept], high[kept], front[kept]
     turn = np.where(area[kept] < 0, -1.0, 1.0)[:, None]
     # A centre is inside a polygon where inward . (centre - corner) > 0 for every edge.
-    edges = _Edges(polygons[kept], -down[kept] * turn, across[kept] * turn, length[kept], margin)
+    edges = _Edges(polygons[kept], -down[kept] * turn, across[kept] * turn, length[kept], margins[kept])
     rows = (high[:, 1] - low[:, 1] + 1).astype(np.intp)
     for row_batch in _batches(rows):
         index, step = _expanded(rows[row_batch], row_batch.start)
@@ -263,11 +292,14 @@ class _Edges:
     owns: whether (P, E) points on the edge belong to the polygon.
     """
 
-    def __init__(self, corners: Array, x: Array, y: Array, length: Array, margin: float) -> None:
-        """corners: (P, E, 2) [1/256 pixel]. x, y: the inward normals (P, E). length: the edges' lengths (P, E)."""
+    def __init__(self, corners: Array, x: Array, y: Array, length: Array, margins: Array) -> None:
+        """corners: (P, E, 2) [1/256 pixel]. x, y: the inward normals (P, E). length: the edges' lengths (P, E).
+
+        margins: (P,) [1/256 pixel].
+        """
         self.corner_x, self.corner_y = corners[..., 0], corners[..., 1]
         self.x, self.y = x, y
-        self.slack = margin * length
+        self.slack = margins[:, None] * length
         self.real = length > 0
         # The fill rule: the inward normal of a left edge points right, and that of a top edge points straight down.
         self.owns = ~self.real | (x > 0) | ((x == 0) & (y > 0))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
 from glshade.document import Direction, Document, Finite, Vector3, fault
+from glshade.errors import figure
 
 Array = NDArray[np.float64]
 Row4 = tuple[Finite, Finite, Finite, Finite]
@@ -139,9 +140,10 @@ class Camera(Document):
                     yield (key,), "cannot be used together with matrix, which replaces it"
         near, far = data.get("near"), data.get("far")
         if isinstance(near, number) and isinstance(far, number) and near >= far:
-            yield ("near",), f"{near:g} must be less than far, {far:g}"
-        if isinstance(near, number) and near <= 0 and data.get("type", "perspective") == "perspective":
-            yield ("near",), f"must be greater than 0 in a perspective view, not {near:g}"
+            yield ("near",), f"{figure(near)} must be less than far, {figure(far)}"
+        for key, depth in (("near", near), ("far", far)):
+            if isinstance(depth, number) and depth <= 0 and data.get("type", "perspective") == "perspective":
+                yield (key,), f"must be greater than 0 in a perspective view, not {figure(depth)}"
         eye, target = data.get("eye"), data.get("target")
         if eye is not None and target is not None and list(eye) == list(target):
             yield ("target",), "is where the eye is: there is no direction of view"

@@ -8,6 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from glshade.document import Document
+from glshade.files import read_bytes
+from glshade.limits import LARGEST_MESH
 from glshade.mesh import file as mesh_file
 from glshade.mesh.mesh import Mesh
 from glshade.scene.scene import Scene
@@ -19,13 +21,15 @@ def scene_digest(scene: Scene) -> str:
     Errors: AssetError for a mesh file, OSError for another file that cannot be read.
     """
 
+    load = scene.loader()
+
     def content(value: Any) -> Any:
         if isinstance(value, Path) and value.suffix.lower() in mesh_file.SUFFIXES:
             # The model is hashed, not the file's bytes, since the model also has the materials and buffers from other files.
-            parts = mesh_file.load(value).parts
+            parts = load(value).parts
             return [(part.mesh.digest, part.transform.tolist(), files(part.material)) for part in parts]
         if isinstance(value, Path):
-            return hashlib.sha256(value.read_bytes()).hexdigest()
+            return hashlib.sha256(read_bytes(value, LARGEST_MESH)).hexdigest()
         if isinstance(value, Mesh):
             return value.digest
         if isinstance(value, Document):

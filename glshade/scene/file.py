@@ -3,30 +3,43 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from pydantic import ValidationError
 
-from glshade.document import Document, nearest
+from glshade.document import nearest
 from glshade.errors import AssetError, SceneError
+from glshade.files import read_bytes
 from glshade.image.file import probe
+from glshade.limits import DEFAULT, LARGEST_SCENE, MOST_FAULTS, Limits
 from glshade.mesh import file as mesh_file
 from glshade.mesh.model import Model
+from glshade.scene import checking
 from glshade.scene.models import Folders, use_models
 from glshade.scene.scene import Scene
-from glshade.textures.texture import Picture
 
 if TYPE_CHECKING:
     from glshade.scene.override import Overrides
 
 TEXT_SUFFIXES = (".toml", ".json")
+# A dotted key of more than 64 parts, for which Python's parser of TOML takes time that grows with the square of their number.
+LONG_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){64}""")
 
 
-def load(path: str | Path, overrides: Overrides = (), *, models: Folders | None = None) -> Scene:
+def load(
+    path: str | Path,
+    overrides: Overrides = (),
+    *,
+    models: Folders | None = None,
+    allow_outside: bool = False,
+    limits: Limits = DEFAULT,
+) -> Scene:
     """Returns the scene in a file, and reads its meshes.
 
     For a mesh file alone, a default camera and the default lights are chosen, and the materials are the mesh file's own.
@@ -34,24 +47,28 @@ def load(path: str | Path, overrides: Overrides = (), *, models: Folders | None 
     overrides: values that replace those of the file, in their order: a table of dotted keys such as "materials.body.roughness"
         or "objects.ball.shading"; or pairs of key and text, as in `--set KEY=VALUE`.
     models: a folder, or several, with reflectance models and lights of the user's own.
+    allow_outside: whether mesh files may name textures, materials and buffers outside their folder and the folders that the
+        scene names. docs/security.md explains it.
+    limits: the largest numbers of triangles and pixels.
     Errors: SceneError with every fault, each with the file, the key path and the values that are allowed.
     """
     use_models(models)
-    return SceneFile(path, overrides).scene()
+    limits = replace(limits, allow_outside=limits.allow_outside or allow_outside)
+    return SceneFile(path, overrides, limits).scene()
 
 
 class SceneFile:
     """A scene file, which returns its scene at any frame and through any of its cameras."""
 
-    def __init__(self, path: str | Path, overrides: Overrides = ()) -> None:
-        """Reads the file. path and overrides: as for `load`.
+    def __init__(self, path: str | Path, overrides: Overrides = (), limits: Limits = DEFAULT) -> None:
+        """Reads the file. path, overrides and limits: as for `load`.
 
         Errors: SceneError for a file that cannot be read, and for overrides whose keys name no value.
         """
-        self.path = Path(path)
+        self.path, self.limits = Path(path), limits
         suffix = self.path.suffix.lower()
         if suffix in mesh_file.SUFFIXES:
-            mesh_file.load(self.path)
+            mesh_file.load(self.path, limits)
             # Overrides find the object by its name. The path is absolute, so that it is right from any folder.
             mesh = {"name": self.path.stem, "mesh": str(self.path.resolve())}
             document: Any = {"description": self.path.name, "objects": [mesh], "film": {"samples": 4, "background": BACKDROP}}
@@ -74,7 +91,7 @@ class SceneFile:
     @cached_property
     def _written(self) -> Scene:
         """The scene without its animation. Errors: SceneError."""
-        return parse(self.document, self.path)
+        return parse(self.document, self.path, self.limits)
 
     @property
     def cameras(self) -> tuple[str, ...]:
@@ -95,7 +112,7 @@ class SceneFile:
                 raise
             own: tuple[str, ...] = ()
             try:
-                SceneFile(self.path)._scene(frame, camera)
+                SceneFile(self.path, limits=self.limits)._scene(frame, camera)
             except SceneError as written:
                 own = written.problems
             raise SceneError([fault if fault in own else f"{fault} (from --set)" for fault in error.problems]) from None
@@ -121,7 +138,7 @@ class SceneFile:
             document = at_frame(self.document, written.animation, frame)
         except OverrideError as error:
             raise SceneError(f"{self.path}: animation: {error}") from None
-        return parse(_merged(written, self.document, document), self.path)
+        return parse(_merged(written, self.document, document), self.path, self.limits)
 
     def _through(self, camera: str, scene: Scene) -> Scene:
         """Returns the scene with one of its further cameras; the same object for the same scene."""
@@ -134,22 +151,24 @@ class SceneFile:
         problems: list[str] = []
         models: dict[Path, Model] = {}
         faults: dict[Path, tuple[str, ...]] = {}
+        load = scene.loader()
         for index, item in enumerate(scene.objects):
             if not isinstance(item.mesh, Path):
                 continue
             if item.mesh not in models and item.mesh not in faults:
                 try:
-                    models[item.mesh] = mesh_file.load(item.mesh)
+                    models[item.mesh] = load(item.mesh)
                 except SceneError as error:
                     faults[item.mesh] = error.problems
             problems.extend(f"{self.path}: objects[{index}].mesh: {problem}" for problem in faults.get(item.mesh, ()))
         self._models = models
-        for place, picture in _pictures(scene, self._checked):
-            if picture in self._probed:
+        for place, picture in scene.pictures(self._checked):
+            path = picture.texture
+            if path in self._probed:
                 continue
             try:
-                probe(picture)
-                self._probed.add(picture)
+                probe(path)
+                self._probed.add(path)
             except AssetError as error:
                 problems.append(f"{self.path}: {place}: {error}")
         if problems:
@@ -198,57 +217,57 @@ def _overridden(document: Any, overrides: Overrides, path: Path) -> Any:
             problems.append(f"{path}: --set {error}")
     if problems:
         raise SceneError(problems)
+    _refuse([fault for key, value in values for fault in checking.faults({key: value})], path)
     return document
-
-
-def _pictures(scene: Scene, known: Scene | None) -> Iterator[tuple[str, Path]]:
-    """Yields (key path, file) for every texture of the scene, except in materials that it shares with the scene `known`."""
-    shared = {id(material) for _, material in _materials(known)} if known else set()
-    for place, material in _materials(scene):
-        if isinstance(material, Document) and id(material) not in shared:
-            for name in type(material).model_fields:
-                value = getattr(material, name)
-                if isinstance(value, Picture):
-                    yield f"{place}.{name}.texture", value.texture
-
-
-def _materials(scene: Scene) -> Iterator[tuple[str, Any]]:
-    """Yields (key path, material) for the scene's table of materials and for the material of every object."""
-    yield from ((f"materials.{name}", material) for name, material in scene.materials.items())
-    yield from ((f"objects[{index}].material", item.material) for index, item in enumerate(scene.objects))
 
 
 # The background of a scene that is a mesh file alone: a dark grey, from which light and dark objects both stand out.
 BACKDROP = (0.05, 0.055, 0.065)
 
 
-def parse(data: Any, path: Path) -> Scene:
+def parse(data: Any, path: Path, limits: Limits = DEFAULT) -> Scene:
     """Returns the scene that a table describes.
 
     data: the table, as read from a file.
     path: the scene file, which messages name; the paths in the table are relative to its folder.
+    limits: the limits of the scene.
     Errors: SceneError with every fault.
     """
     try:
-        return Scene.model_validate(data, context={"folder": path.parent.resolve()})
+        return Scene.model_validate(data, context={"folder": path.parent.resolve(), "limits": limits})
     except ValidationError as error:
-        raise SceneError([f"{path}: {_key_path(e['loc'])}{e['msg']}" for e in error.errors(include_url=False)]) from None
+        found = error.errors(include_url=False, include_context=False, include_input=False)
+        _refuse([(e["loc"], e["msg"]) for e in found], path)
+        raise
 
 
 def _read(path: Path) -> Any:
     """Returns the content of a TOML or JSON file. Errors: SceneError."""
     try:
-        text = path.read_bytes().decode("utf-8-sig")
+        text = read_bytes(path, LARGEST_SCENE).decode("utf-8-sig")
     except FileNotFoundError:
         raise SceneError(f"{path}: there is no such file") from None
     except OSError as error:
         raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     except UnicodeDecodeError as error:
         raise SceneError(f"{path}: is not UTF-8 text (byte {error.start})") from None
+    is_toml = path.suffix.lower() == ".toml"
     try:
-        return tomllib.loads(text) if path.suffix.lower() == ".toml" else json.loads(text)
-    except (tomllib.TOMLDecodeError, json.JSONDecodeError, RecursionError) as error:
+        if is_toml and LONG_KEY.search(text):
+            raise ValueError("a key has more than 64 parts")
+        document = tomllib.loads(text) if is_toml else json.loads(text)
+    except (ValueError, RecursionError) as error:  # Python refuses whole numbers of more than 4300 digits by a ValueError
         raise SceneError(f"{path}: is not {path.suffix[1:].upper()}: {error}") from None
+    _refuse([(loc, message) for loc, message in checking.faults(document)], path)
+    return document
+
+
+def _refuse(faults: Sequence[tuple[tuple[str | int, ...], str]], path: Path) -> None:
+    """Raises the faults of a document, given as pairs (key path, message), if there are any. Errors: SceneError."""
+    if faults:
+        lines = [f"{path}: {_key_path(loc)}{message}" for loc, message in faults[:MOST_FAULTS]]
+        more = len(faults) - len(lines)
+        raise SceneError([*lines, f"{path}: {more:,} more faults"] if more else lines)
 
 
 def _key_path(loc: tuple[str | int, ...]) -> str:

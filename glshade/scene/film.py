@@ -16,12 +16,17 @@ from pydantic import (
 )
 
 from glshade.document import Document, Finite, fault, nearest, number, resolved, value_of
+from glshade.errors import figure
 from glshade.image.layers import AOVS
+from glshade.limits import Limits
 
 # The largest side of a picture [pixels]. A row of 2^17 pixels of 16 bytes is 2 MiB, which other programs can still open.
 LARGEST_SIDE = 131072
 # 16 x 16 pictures already take 256 times as long as one, so a larger number is most likely a typing error.
 LARGEST_SUPERSAMPLE = 16
+
+# The largest number of a background. The sum of 16 x 16 of them fits into float32.
+BRIGHTEST = 1e30
 
 Side = Annotated[int, Field(ge=1, le=LARGEST_SIDE), BeforeValidator(number)]
 Corner = Annotated[int, Field(ge=0, lt=LARGEST_SIDE), BeforeValidator(number)]
@@ -30,8 +35,10 @@ Corner = Annotated[int, Field(ge=0, lt=LARGEST_SIDE), BeforeValidator(number)]
 def _colour_with_alpha(value: tuple[float, ...]) -> tuple[float, ...]:
     if len(value) not in (3, 4):
         raise fault(f"must be 3 numbers, or 4 with alpha, not {len(value)}")
+    if max(map(abs, value)) > BRIGHTEST:
+        raise fault(f"must be at most {BRIGHTEST:g} in absolute value")
     if len(value) == 4 and not 0 <= value[3] <= 1:
-        raise fault(f"alpha must be from 0 to 1, not {value[3]:g}")
+        raise fault(f"alpha must be from 0 to 1, not {figure(value[3])}")
     return value
 
 
@@ -100,6 +107,13 @@ class Film(Document):
     def window(self) -> tuple[int, int, int, int]:
         """x, y, width and height of the window that is drawn: the crop, else the whole picture [pixels]."""
         return self.crop or (0, 0, *self.size)
+
+    def excess(self, limits: Limits) -> str | None:
+        """Returns the message that says by how much the film exceeds the limit of shaded pixels; None if it does not."""
+        shaded = self.window[2] * self.window[3] * self.supersample**2
+        if shaded <= limits.max_pixels:
+            return None
+        return f"shades {shaded:,} pixels (supersample^2 for each pixel); {limits.max_pixels:,} are allowed: see --max-pixels"
 
     @property
     def transformed(self) -> bool:

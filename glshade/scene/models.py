@@ -14,7 +14,9 @@ from typing import Any
 
 from glshade.brdfs import BRDFS, Brdf
 from glshade.errors import SceneError
+from glshade.files import check_regular, read_bytes
 from glshade.lights import LIGHTS, Light
+from glshade.limits import LARGEST_SHADER
 
 # The package name that modules from the users' folders have in sys.modules.
 PACKAGE = "glshade_models"
@@ -69,6 +71,11 @@ def _files(folder: Path) -> list[Path]:
     """Returns the Python files of a folder's models. Errors: SceneError where there are none."""
     if not folder.is_dir():
         raise SceneError(f"{folder}: is not a folder")
+    for path in folder.glob("*.py"):
+        try:
+            check_regular(path)
+        except OSError as error:
+            raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     files = sorted(path for path in folder.glob("*.py") if not path.stem.startswith("_"))
     if not files:
         raise SceneError(f"{folder}: has no models: a model is NAME.py with NAME.glsl beside it")
@@ -79,7 +86,7 @@ def _digest(folder: Path) -> str:
     """Returns the SHA-256 of a folder's Python files, those that start with _ included."""
     digest = hashlib.sha256()
     for path in sorted(folder.glob("*.py")):
-        digest.update(f"\0{path.name}\0".encode() + path.read_bytes())
+        digest.update(f"\0{path.name}\0".encode() + read_bytes(path, LARGEST_SHADER))
     return digest.hexdigest()
 
 

@@ -7,7 +7,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from glshade.document import nearest
+from glshade.document import nearest, shortened
 from glshade.presets import PRESETS
 
 # A table of dotted keys and values; or pairs of key and text as on a command line, where a key may come several times.
@@ -51,10 +51,10 @@ def parse(text: str) -> Any:
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         if not text or text[0] in "[{\"'":
             # The position at the end of TOML's message is cut off, because it counts the prefix "value = ".
-            raise ValueError(f"{_short(text)} is not a value of TOML: {str(error).partition(' (at')[0]}") from None
+            raise ValueError(f"{shortened(text)} is not a value of TOML: {str(error).partition(' (at')[0]}") from None
         return text
     if len(table) > 1:
-        raise ValueError(f"{_short(text)} is not a single value")
+        raise ValueError(f"{shortened(text)} is not a single value")
     return table["value"]
 
 
@@ -112,7 +112,7 @@ def _put(node: Any, parts: tuple[str, ...], before: tuple[str, ...], value: Any)
     if isinstance(node, str):
         node = _unfolded(node, path)
     if not isinstance(node, Mapping):
-        raise OverrideError(f"{_key(path)}: {_key(before)} is {_short(node)}, not a table")
+        raise OverrideError(f"{_key(path)}: {_key(before)} is {shortened(node)}, not a table")
     below = node.get(part)
     if below is None and rest and before == ("materials",):
         if part not in PRESETS:
@@ -134,7 +134,7 @@ def _unfolded(word: str, path: tuple[str, ...]) -> dict[str, Any]:
     if before[-1] == "material":
         instead = _key(("materials", word, part))
         raise OverrideError(f'{_key(path)}: the material is named "{word}"; set {instead} in its place')
-    raise OverrideError(f"{_key(path)}: {_key(before)} is {_short(word)}, not a table")
+    raise OverrideError(f"{_key(path)}: {_key(before)} is {shortened(word)}, not a table")
 
 
 def _index(items: list[Any] | tuple[Any, ...], path: tuple[str, ...]) -> int:
@@ -157,9 +157,3 @@ def _index(items: list[Any] | tuple[Any, ...], path: tuple[str, ...]) -> int:
 def _key(parts: Iterable[str]) -> str:
     """Returns the dotted key of its parts, with quotes where a part needs them."""
     return ".".join(part if re.fullmatch(BARE, part) else f'"{part}"' for part in parts)
-
-
-def _short(value: object) -> str:
-    """Returns the value as Python writes it, cut to 40 characters so that the message stays readable."""
-    text = repr(value)
-    return text if len(text) <= 40 else f"{text[:36]} ..."

@@ -1,23 +1,26 @@
 """Scene: the root of the document. Its classes define the file format, the JSON schema and the Python interface at once."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
+from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import (
-    Field,
-    model_validator,
-)
+from pydantic import Field, PrivateAttr, model_validator
 
 from glshade.document import Chosen, Document, nearest, value_of
 from glshade.lights import LIGHTS, Light
+from glshade.limits import LONGEST_CHAIN, UNLIMITED, Limits
+from glshade.mesh import file as mesh_file
+from glshade.mesh.model import Model
 from glshade.presets import PRESETS, preset
 from glshade.scene.animation import Track
 from glshade.scene.camera import CAMERAS, Camera, Perspective
 from glshade.scene.film import Film
 from glshade.scene.object import Material, Object
 from glshade.scene.quality import Quality
+from glshade.textures.texture import Picture
 
 Array = NDArray[np.float64]
 
@@ -47,6 +50,55 @@ class Scene(Document):
     )
     animation: tuple[Track, ...] = Field((), description="values that change from frame to frame")
 
+    # The limits under which the scene's file was read; a scene that was built in Python has none.
+    _limits: Limits = PrivateAttr(UNLIMITED)
+
+    def model_post_init(self, context: Any) -> None:
+        """Stores the limits that the validation context holds under the key "limits"."""
+        self._limits = (context or {}).get("limits", UNLIMITED)
+
+    def __eq__(self, other: object) -> bool:
+        """Compares the values of two scenes, whatever their limits."""
+        return isinstance(other, Scene) and all(getattr(self, key) == getattr(other, key) for key in Scene.model_fields)
+
+    @property
+    def limits(self) -> Limits:
+        """The limits of the work that the scene may ask for, and of the files that its mesh files may name."""
+        return self._limits
+
+    def quality_of(self, item: Object) -> Quality:
+        """Returns the quality with which an object is drawn: its own, over the scene's."""
+        return item.quality.over(self.quality) if item.quality else self.quality
+
+    def pictures(self, known: "Scene | None" = None) -> Iterator[tuple[str, Picture]]:
+        """Yields (key path, texture) for every texture that the scene itself names.
+
+        known: optional, another scene; materials that both scenes share are left out.
+        """
+        shared = {id(material) for _, material in known.placed_materials()} if known else set()
+        for place, material in self.placed_materials():
+            if isinstance(material, Document) and id(material) not in shared:
+                for name in type(material).model_fields:
+                    value = getattr(material, name)
+                    if isinstance(value, Picture):
+                        yield f"{place}.{name}.texture", value
+
+    def placed_materials(self) -> Iterator[tuple[str, Any]]:
+        """Yields (key path, material) for the scene's table of materials and for the material of every object."""
+        yield from ((f"materials.{name}", material) for name, material in self.materials.items())
+        yield from ((f"objects[{index}].material", item.material) for index, item in enumerate(self.objects))
+
+    def loader(self) -> Callable[[Path], Model]:
+        """Returns the function that loads the scene's mesh files.
+
+        The mesh files may name other files in their own folders, and in the folders of all files that the scene names.
+        """
+        named = [item.mesh for item in self.objects if isinstance(item.mesh, Path)]
+        if not named:
+            return partial(mesh_file.load, limits=self._limits)
+        folders = {path.parent for path in (*named, *(picture.texture for _, picture in self.pictures()))}
+        return partial(mesh_file.load, limits=self._limits, folders=frozenset(folder.resolve() for folder in folders))
+
     @model_validator(mode="before")
     @classmethod
     def _with_presets(cls, data: Any) -> Any:
@@ -72,7 +124,7 @@ class Scene(Document):
                 if name in names:
                     yield ("objects", index, "name"), f'"{name}" is already the name of objects[{names[name]}]'
                 names.setdefault(name, index)
-        parents = {value_of(item, "name"): value_of(item, "parent") for item in objects}
+        parents = {name: value_of(objects[index], "parent") for name, index in names.items()}
         for index, item in enumerate(objects):
             material, parent = value_of(item, "material"), value_of(item, "parent")
             if isinstance(material, str) and material not in materials and material not in PRESETS:
@@ -80,17 +132,20 @@ class Scene(Document):
                     ("objects", index, "material"),
                     f'no material or preset is named "{material}"' + nearest(material, {*materials, *PRESETS}),
                 )
-            if parent is None:
+            if not isinstance(parent, str):
                 continue
             if parent not in names:
                 yield ("objects", index, "parent"), f'no object is named "{parent}"' + nearest(parent, names)
                 continue
-            chain = [value_of(item, "name")]
-            while parent is not None and parent not in chain:
-                chain.append(parent)
+            # A dict keeps the order of the chain, and looks a name up in constant time.
+            chain = {value_of(item, "name"): None}
+            while isinstance(parent, str) and parent not in chain and len(chain) <= LONGEST_CHAIN:
+                chain[parent] = None
                 parent = parents.get(parent)
-            if parent is not None and parent == chain[0]:
-                yield ("objects", index, "parent"), "a cycle: " + " -> ".join(str(link) for link in [*chain, parent])
+            if len(chain) > LONGEST_CHAIN:
+                yield ("objects", index, "parent"), f"a chain of more than {LONGEST_CHAIN} parents"
+            elif parent == next(iter(chain)) and parent is not None:
+                yield ("objects", index, "parent"), "a cycle: " + " -> ".join([*chain, parent])
         for index, light in enumerate(_items(data, "lights")):
             only = value_of(light, "only")
             for place, name in enumerate(only if isinstance(only, list | tuple) else ()):

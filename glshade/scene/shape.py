@@ -20,6 +20,11 @@ class Shape(Document):
 
     type: str
 
+    @property
+    def triangle_count(self) -> int:
+        """The number of triangles of the shape, known before its mesh is made."""
+        raise NotImplementedError
+
     def mesh(self) -> Mesh:
         """Returns the mesh of the shape. Equal shapes share one Mesh for as long as it is in use or in the LRU cache."""
         return _meshes.find(self, self._made, lambda mesh: mesh.nbytes)
@@ -38,6 +43,10 @@ class Sphere(Shape):
     segments: Segments = Field(96, description="number of segments round the y axis")
     rings: Annotated[int, Field(ge=2, le=4096)] = Field(48, description="number of rings from pole to pole")
 
+    @property
+    def triangle_count(self) -> int:
+        return 2 * self.segments * (self.rings - 1)
+
 
 class Icosphere(Shape):
     """A sphere of radius 1 whose triangles have almost the same size."""
@@ -45,11 +54,19 @@ class Icosphere(Shape):
     type: Literal["icosphere"] = "icosphere"
     subdivisions: Annotated[int, Field(ge=0, le=9)] = Field(4, description="n: the sphere has 20 x 4^n triangles")
 
+    @property
+    def triangle_count(self) -> int:
+        return 20 << 2 * self.subdivisions
+
 
 class Cube(Shape):
     """A cube from -1 to 1 along each axis."""
 
     type: Literal["cube"] = "cube"
+
+    @property
+    def triangle_count(self) -> int:
+        return 12
 
 
 class Plane(Shape):
@@ -57,6 +74,10 @@ class Plane(Shape):
 
     type: Literal["plane"] = "plane"
     segments: Annotated[int, Field(ge=1, le=4096)] = Field(1, description="number of segments along each side")
+
+    @property
+    def triangle_count(self) -> int:
+        return 2 * self.segments**2
 
 
 class Torus(Shape):
@@ -67,6 +88,10 @@ class Torus(Shape):
     segments: Segments = Field(96, description="number of segments round the y axis")
     sides: Segments = Field(48, description="number of segments round the tube")
 
+    @property
+    def triangle_count(self) -> int:
+        return 2 * self.segments * self.sides
+
 
 class Cylinder(Shape):
     """A cylinder of radius 1 with caps, from y = -1 to y = 1."""
@@ -74,12 +99,20 @@ class Cylinder(Shape):
     type: Literal["cylinder"] = "cylinder"
     segments: Segments = Field(64, description="number of segments round the y axis")
 
+    @property
+    def triangle_count(self) -> int:
+        return 4 * self.segments
+
 
 class Cone(Shape):
     """A cone with a cap of radius 1 at y = -1 and its tip at y = 1."""
 
     type: Literal["cone"] = "cone"
     segments: Segments = Field(64, description="number of segments round the y axis")
+
+    @property
+    def triangle_count(self) -> int:
+        return 2 * self.segments
 
 
 SHAPES: dict[str, type[Document]] = {

@@ -49,7 +49,8 @@ class Texture(Picture):
 class NormalMap(Picture):
     """A map of tangent-space normals n = 2 rgb - 1: x along the tangent (u), y along the bitangent (v), z along the normal.
 
-    The file is read as linear.
+    The file is read as linear. Only the mapped normal decides whether a point faces a light. So light from behind a face may
+    leak through it where the mapped normal leans toward the light; bump maps and smooth normals leak in the same way.
     """
 
     scale: Finite = Field(1.0, description="multiplies x and y of the normals")

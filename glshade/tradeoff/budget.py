@@ -7,6 +7,7 @@ import json
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
+from decimal import ROUND_CEILING, Context
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,7 @@ from glshade.scene.digest import scene_digest
 from glshade.scene.object import Object
 from glshade.scene.quality import Quality
 from glshade.scene.scene import Scene
-from glshade.tradeoff.choice import BudgetError, Choice, applied, words_of
+from glshade.tradeoff.choice import BudgetError, Choice, applied, simplest, words_of
 from glshade.tradeoff.front import Timing
 from glshade.tradeoff.setting import EXACT, Setting, space
 from glshade.tradeoff.study import timed
@@ -71,7 +72,7 @@ def choose(scene: Scene, renderer: Renderer, limits: Mapping[str, float], *, cou
     least = measured.errors(exact)
     if not within(least, limits, 1.0):
         reached = {metric: getattr(least, metric) for metric in limits}
-        words = ", ".join(f"{metric} {limits[metric]:g} (at least {error:.2g})" for metric, error in reached.items())
+        words = ", ".join(f"{metric} {limits[metric]:g} (at least {rounded_up(error, 2)})" for metric, error in reached.items())
         raise BudgetError(f"no setting meets the budget on {count} views: {words}", reached)
     uniform = measured.uniform()
     faster = [(setting, timing) for setting, timing in uniform if setting != EXACT and timing.median < measured.exact.median]
@@ -87,10 +88,11 @@ def choose(scene: Scene, renderer: Renderer, limits: Mapping[str, float], *, cou
         share *= 0.8
     if not within(worst, limits, SAFETY):
         chosen, worst = exact, least
+    chosen = simplest(scene, chosen)
     seconds, exact_seconds = measured.time(chosen)
     if seconds > WORTH * exact_seconds:
         chosen, worst, seconds = exact, least, exact_seconds
-    runner_up = measured.runner_up(chosen, uniform, limits, seconds)
+    runner_up = measured.runner_up(chosen, uniform, limits, seconds / exact_seconds)
     choice = Choice(tuple(chosen), dict(limits), worst, seconds, exact_seconds, count, runner_up)
     _write(path, choice)
     return choice
@@ -109,19 +111,26 @@ def within_deadline(scene: Scene, renderer: Renderer, seconds: float, *, count: 
     if not quick:
         setting, timing = min(uniform, key=lambda pair: pair[1].median)
         raise BudgetError(
-            f"no setting draws a frame in {seconds * 1e3:g} ms; the fastest takes {timing.median * 1e3:.2f} ms "
+            f"no setting draws a frame in {seconds * 1e3:g} ms; the fastest takes {rounded_up(timing.median * 1e3, 3)} ms "
             f"({words_of(setting)})",
             {"seconds": timing.median},
         )
     number = len(scene.objects)
     candidates = [(measured.errors([setting] * number), timing.median, setting) for setting, timing in quick]
     candidates.sort(key=lambda candidate: (candidate[0].max_abs, candidate[1]))
+    least, time, setting = candidates[0]
+    chosen = simplest(scene, [setting] * number)
     runner_up = ""
     if len(candidates) > 1:
-        worst, time, setting = candidates[1]
-        runner_up = f"{words_of(setting)}, {time * 1e3:.2f} ms, max_abs {worst.max_abs:.2g}"
-    worst, time, setting = candidates[0]
-    return Choice((setting,) * number, {}, worst, time, measured.exact.median, count, runner_up)
+        worst, longer, setting = candidates[1]
+        runner_up = f"{words_of(setting)} for all takes {longer / time:.2f} times as long, max_abs {worst.max_abs:.2g}"
+    return Choice(tuple(chosen), {}, least, time, measured.exact.median, count, runner_up)
+
+
+def rounded_up(number: float, digits: int) -> str:
+    """Returns a number as text, rounded up, so that a limit of this size is met. digits: the number of significant digits."""
+    rounded = Context(prec=digits, rounding=ROUND_CEILING).create_decimal(repr(float(number)))
+    return f"{float(rounded):g}"
 
 
 def within(worst: Errors, limits: Mapping[str, float], share: float) -> bool:
@@ -280,25 +289,27 @@ class _Measurements:
         return self.renderer.render(scene, dtype="float32").pixels[..., :3].copy()
 
     def runner_up(
-        self, chosen: Sequence[Setting], uniform: Sequence[tuple[Setting, Timing]], limits: Mapping[str, float], seconds: float
+        self, chosen: Sequence[Setting], uniform: Sequence[tuple[Setting, Timing]], limits: Mapping[str, float], share: float
     ) -> str:
         """Returns a description of the next best choice: the fastest single setting for all objects within the limits.
 
-        The description is empty if no setting is within the limits.
+        The description is empty if no setting is within the limits. Times are compared by their ratios to the exact setting's
+        time, because the machine's speed may have changed since `uniform` measured.
         chosen: the setting that was chosen for each object.
         uniform: the settings with their times, as the method `uniform` returns them.
         limits: metric -> the largest allowed error.
-        seconds: the time of the chosen settings; settings that are faster were rejected already [s].
+        share: the ratio of the chosen settings' time to the exact setting's time; faster settings were rejected already.
         """
         for setting, timing in uniform:
             same = [setting] * len(self.scene.objects)
-            if timing.median < seconds or same == list(chosen):
+            ratio = timing.median / self.exact.median / share
+            if ratio < 1 or simplest(self.scene, same) == list(chosen):
                 continue
             if all(self._fits(group, setting, limits) for group in range(len(self.groups))):
                 worst = self.errors(same)
                 if within(worst, limits, 1.0):
                     words = ", ".join(f"{metric} {getattr(worst, metric):.2g}" for metric in limits)
-                    return f"{words_of(setting)} for all, {timing.median * 1e3:.2f} ms, {words}"
+                    return f"{words_of(setting)} for all takes {ratio:.2f} times as long, {words}"
         return ""
 
 

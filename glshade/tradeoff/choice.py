@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields, replace
 from typing import Any
 
 from glshade.errors import GlshadeError
 from glshade.image.metrics import METRICS, Errors
 from glshade.scene.quality import Quality
 from glshade.scene.scene import Scene
-from glshade.tradeoff.setting import Setting
+from glshade.tradeoff.setting import EXACT, Setting, drawn_from
 
 
 class BudgetError(GlshadeError):
@@ -36,7 +36,8 @@ class Choice:
     seconds: the time of a frame [s].
     exact_seconds: the time of a frame at the exact setting [s].
     views: the number of views on which the errors were measured.
-    runner_up: the next best setting in words, with its time and errors; empty if no other setting is within the budget.
+    runner_up: the next best setting in words, with the ratio of its time to the chosen settings' time, and its errors; empty if
+        no other setting is within the budget.
     """
 
     settings: tuple[Setting, ...]
@@ -108,6 +109,23 @@ def applied(scene: Scene, settings: Sequence[Setting]) -> Scene:
         objects.append(item.model_copy(update={"quality": quality}))
     whole = Quality() if scene.quality.storage is None else Quality(storage=scene.quality.storage)
     return scene.model_copy(update={"objects": tuple(objects), "quality": whole})
+
+
+def simplest(scene: Scene, settings: Sequence[Setting]) -> list[Setting]:
+    """Returns the settings, one for each object, without the values that change nothing for their object.
+
+    A value is dropped if the object's programs, materials and vertices are the same without it.
+    settings: one for each object.
+    """
+    result = list(settings)
+    same = drawn_from(applied(scene, result))
+    for name in (field.name for field in fields(Setting)):
+        without = [replace(setting, **{name: getattr(EXACT, name)}) for setting in result]
+        if without == result:
+            continue
+        changed = {old[0] for old, new in zip(same, drawn_from(applied(scene, without)), strict=True) if old != new}
+        result = [result[number] if number in changed else setting for number, setting in enumerate(without)]
+    return result
 
 
 def words_of(setting: Setting) -> str:

@@ -109,7 +109,7 @@ def space(scene: Scene, only: tuple[str, ...] = ()) -> tuple[list[Setting], dict
         # less often.
         bare = replace(setting, storage=EXACT.storage, samples=None)
         if bare not in parts:
-            parts[bare] = _sources(scene, bare)
+            parts[bare] = drawn_from(bare.applied(scene))
         sources = parts[bare], setting.storage, setting.samples
         choices = {(f.name, getattr(setting, f.name)) for f in fields(Setting)}
         tried |= choices
@@ -156,12 +156,13 @@ def _combinations(scene: Scene, wanted: tuple[str, ...]) -> Iterator[Setting]:
         yield Setting(fresnel=fresnel, specular=specular, arithmetic=arithmetic, samples=samples, storage=storage, **way)
 
 
-def _sources(scene: Scene, setting: Setting) -> Any:
-    """Returns everything that a picture is drawn from, except its storage.
+def drawn_from(scene: Scene) -> tuple[Any, ...]:
+    """Returns everything that a picture of the scene is drawn from, except its storage, for each instance.
 
-    The results for two settings are equal if both draw the same picture.
+    The results for two scenes are equal if both draw the same picture. The first item of each entry is the object's number.
     """
-    assembly = ready(setting.applied(scene))
+    assembly = ready(scene)
     return tuple(
-        (generate(plan_instance(i, assembly, "linear")), i.material, i.mesh.digest, i.back_faces) for i in assembly.instances
+        (i.number, generate(plan_instance(i, assembly, "linear")), i.material, i.mesh.digest, i.back_faces)
+        for i in assembly.instances
     )

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.reference.bounds import Bounds, alphas, fragment_bounds
+from glshade.reference.bounds import TINY, Bounds, alphas, fragment_bounds
 from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.inputs import Inputs, prepare
 from glshade.reference.planes import depth_slack, is_sealed, may_turn
@@ -19,6 +19,12 @@ from glshade.verification.judgement import Expected, PixelClass, classify
 
 Array = NDArray[Any]
 Flags = NDArray[np.bool_]
+
+# If a candidate's interval is wider than this share of the picture's brightest value, its pixel is not decided.
+WIDE = 0.1
+# In a picture that is almost black, this share of the brightest light that arrives at a surface counts as the brightest value:
+# what remains is the rounding error of light that cancels, or that only just reaches a surface.
+DIM = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +69,8 @@ def find_candidates(scene: Scene, *, shading: Rate | None = None, driver: Freedo
     scale = min(1.0, brightest)
     low, high = bounds.interval(scale)
     pixel, base, centre = solid.fragments.pixel, np.arange(len(solid.fragments)), bounds.centre()
+    agreed = _agreeing(width * height, pixel, low, high, open_, inputs.background)
+    classes[agreed & np.isin(classes, (PixelClass.SILHOUETTE, PixelClass.TIE))] = PixelClass.SEAM
     if len(over.fragments):
         # Blended layers lie over opaque surfaces. Where the background may be visible, they may also lie directly over it.
         bare = np.zeros(width * height, dtype=np.bool_)
@@ -85,6 +93,10 @@ def find_candidates(scene: Scene, *, shading: Rate | None = None, driver: Freedo
         classes[uncertain] = PixelClass.SILHOUETTE
         # The candidates of these pixels include the bare background already.
         open_[layered] = False
+    arriving = max((float(b.arriving.max(initial=0.0)) for b in (bounds, over_bounds)), default=0.0)
+    # A scene without light is black, up to the smallest numbers of float32.
+    widest = WIDE * max(brightest, DIM * arriving, 100 * TINY)
+    classes[pixel[(high - low > widest).any(axis=1)]] = PixelClass.WIDE
     picture = np.broadcast_to(inputs.background, (width * height, 4)).copy()
     first = np.flatnonzero(np.append(True, pixel[1:] != pixel[:-1])) if len(pixel) else np.empty(0, dtype=np.intp)
     picture[pixel[first]] = centre[first]
@@ -94,6 +106,28 @@ def find_candidates(scene: Scene, *, shading: Rate | None = None, driver: Freedo
         size, inputs.background, classes[wanted], open_[wanted], np.searchsorted(wanted, pixel), low, high, centre
     )
     return Candidates(inputs, expected, solid.fragments, bounds, base, picture[inputs.wanted])
+
+
+def _agreeing(size: int, pixel: Array, low: Array, high: Array, open_: Flags, background: Array) -> Flags:
+    """Whether all values that each pixel (size,) may have agree within their tolerance: then any of them may be shown.
+
+    They agree if all their intervals together are at most twice as wide as the widest of them, in every channel. In a dense
+    mesh many triangles meet in a pixel, and all have almost the same light.
+    pixel: the pixel (N,) of each candidate, ascending.
+    low, high: the intervals (N, 4) of the candidates.
+    open_: whether (size,) the background may be visible.
+    background: (4,).
+    """
+    agreed = np.zeros(size, dtype=np.bool_)
+    start = np.flatnonzero(np.append(True, pixel[1:] != pixel[:-1])) if len(pixel) else np.empty(0, dtype=np.intp)
+    if len(start):
+        shown = pixel[start]
+        least, largest = np.minimum.reduceat(low, start), np.maximum.reduceat(high, start)
+        bare = open_[shown, None]
+        least = np.where(bare, np.minimum(least, background), least)
+        largest = np.where(bare, np.maximum(largest, background), largest)
+        agreed[shown] = (largest - least <= 2 * np.maximum.reduceat(high - low, start)).all(axis=1)
+    return agreed
 
 
 def surfaces(scene: Scene, *, driver: Freedom = LLVMPIPE) -> tuple[NDArray[np.intp], Flags]:
@@ -134,9 +168,29 @@ def _classified(inputs: Inputs, driver: Freedom) -> tuple[_Pieces, _Pieces, Arra
 
 
 def single_sample(scene: Scene) -> Scene:
-    """Returns the scene with one sample a pixel, stored as float32. The reference has bounds only for such pictures."""
+    """Returns the scene with one sample a pixel, stored as float32, shaded exactly: what the reference has bounds for."""
     film = scene.film.model_copy(update={"samples": 1, "supersample": 1})
-    return scene.model_copy(update={"film": film, "quality": scene.quality.model_copy(update={"storage": None})})
+    exact = {"normalise": None, "arithmetic": None}
+    objects = tuple(
+        item.model_copy(update={"quality": item.quality.model_copy(update=exact)}) if item.quality else item
+        for item in scene.objects
+    )
+    quality = scene.quality.model_copy(update={"storage": None, **exact})
+    return scene.model_copy(update={"film": film, "objects": objects, "quality": quality})
+
+
+def left_out(scene: Scene) -> tuple[str, ...]:
+    """Returns the settings of a scene that `single_sample` takes away, each as "name = value", because they are not judged."""
+    film, quality = scene.film, scene.quality
+    qualities = [quality, *(item.quality for item in scene.objects if item.quality)]
+    settings = [
+        (film.samples > 1, f"film.samples = {film.samples}"),
+        (film.supersample > 1, f"film.supersample = {film.supersample}"),
+        (quality.storage is not None, f"quality.storage = {quality.storage}"),
+        (any(q.normalise is False for q in qualities), "quality.normalise = false"),
+        (any(q.arithmetic == "fast" for q in qualities), "quality.arithmetic = fast"),
+    ]
+    return tuple(text for is_set, text in settings if is_set)
 
 
 @dataclass(frozen=True, eq=False)
@@ -214,9 +268,9 @@ def _settled(inputs: Inputs, fragments: Fragments, slack: Array, driver: Freedom
     which = np.flatnonzero(fragments.partial & ~uncertain)
     if not len(which):
         return _Pieces(fragments, slack, partial, sealed)
-    sealed[which] = is_sealed(inputs, fragments.take(which))
+    sealed[which] = is_sealed(inputs, fragments.take(which), driver)
     pieces = _Pieces(fragments, slack, partial, sealed)
-    turned = which[may_turn(inputs, fragments.take(which))]
+    turned = which[may_turn(inputs, fragments.take(which), driver)]
     if not len(turned):
         return pieces
     other = replace(fragments.take(turned), front=~fragments.front[turned])

@@ -28,6 +28,7 @@ class PixelClass(IntEnum):
     SILHOUETTE: the pixel is at an outline. A driver may show one of several candidates or the background.
     TIE: several surfaces are at depths that a driver may be unable to tell apart.
     MASKED: the caller excluded the pixel by a mask.
+    WIDE: float32 does not determine the pixel's value. A candidate's interval is so wide that it would explain a wrong value.
     """
 
     BACKGROUND = 0
@@ -36,6 +37,7 @@ class PixelClass(IntEnum):
     SILHOUETTE = 3
     TIE = 4
     MASKED = 5
+    WIDE = 6
 
     @property
     def ambiguous(self) -> bool:
@@ -105,12 +107,12 @@ class Comparison:
 
     @property
     def ambiguous(self) -> float:
-        """The share of silhouettes, ties and masked pixels among all pixels."""
+        """The share of silhouettes, ties, masked and wide pixels among all pixels."""
         return self._ambiguous / max(sum(self.counts.values()), 1)
 
     @property
     def doubtful(self) -> float:
-        """The share of silhouettes, ties and masked pixels among the pixels that are not background."""
+        """The share of silhouettes, ties, masked and wide pixels among the pixels that are not background."""
         return self._ambiguous / max(sum(self.counts.values()) - self.counts[PixelClass.BACKGROUND], 1)
 
     @property

@@ -27,6 +27,7 @@ CLASS_COLOURS: dict[PixelClass, tuple[int, int, int]] = {
     PixelClass.SILHOUETTE: (230, 159, 0),
     PixelClass.TIE: (240, 228, 66),
     PixelClass.MASKED: (204, 121, 167),
+    PixelClass.WIDE: (213, 94, 0),
 }
 UNEXPLAINED = (255, 0, 60)
 CLASS_MEANING: dict[PixelClass, str] = {
@@ -36,6 +37,7 @@ CLASS_MEANING: dict[PixelClass, str] = {
     PixelClass.SILHOUETTE: "an outline: any of the candidates, or the background",
     PixelClass.TIE: "surfaces at the same depth: any of them",
     PixelClass.MASKED: "left out by the caller",
+    PixelClass.WIDE: "float32 does not determine the value",
 }
 # The colours of the error map, from the least error to the greatest, sRGB-encoded from 0 to 255.
 RAMP = np.array([(8, 10, 18), (32, 42, 110), (122, 40, 130), (214, 72, 72), (250, 160, 50), (252, 240, 160)], dtype=np.float64)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.driver.freedom import measure_freedom
 from glshade.gl.renderer import Renderer
 from glshade.glsl.source import Rewrite
 from glshade.scene.object import Rate
@@ -65,7 +66,7 @@ def try_mutations(
     Errors: those of `Renderer.render`.
     """
     scene = single_sample(scene)
-    expected = expected or find_candidates(scene, shading=shading)
+    expected = expected or find_candidates(scene, shading=shading, driver=measure_freedom(renderer.context))
 
     def draw(rewrite: Rewrite | None) -> Array:
         renderer.rewrite = rewrite

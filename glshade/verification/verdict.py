@@ -22,7 +22,7 @@ Flags = NDArray[np.bool_]
 Origin = Literal["coverage", "depth", "shading", "encode", "not finite", "-"]
 
 
-# The default largest share of ambiguous pixels (silhouettes, ties and masked pixels) in a picture that can be verified.
+# The default largest share of ambiguous pixels (silhouettes, ties, masked and wide pixels) in a picture that can be verified.
 MAX_AMBIGUOUS = 0.03
 # The largest share of ambiguous pixels among the pixels that are not background. Without this limit, a tiny object on a large
 # background could be verified although all its pixels are ambiguous.
@@ -71,6 +71,7 @@ class Verdict:
     classes: (H, W), the PixelClass of each pixel.
     driver: the names of the OpenGL renderer and version that drew the picture.
     seconds: name of a step -> the time that it took [s].
+    left_out: the settings of the scene that were not judged, each as "name = value"; the picture was drawn without them.
     """
 
     verdict: Literal["verified", "failed", "inconclusive"]
@@ -82,6 +83,7 @@ class Verdict:
     classes: Array = field(repr=False)
     driver: str
     seconds: dict[str, float]
+    left_out: tuple[str, ...] = ()
 
     @property
     def unexplained(self) -> int:
@@ -90,7 +92,7 @@ class Verdict:
 
     @property
     def ambiguous(self) -> float:
-        """The share of silhouettes, ties and masked pixels among all pixels."""
+        """The share of silhouettes, ties, masked and wide pixels among all pixels."""
         return self.comparison.ambiguous
 
     @property
@@ -108,6 +110,8 @@ class Verdict:
             *self.reasons,
             counts,
         ]
+        if self.left_out:
+            lines.append(f"not judged, and left out of the picture: {', '.join(self.left_out)}")
         return "\n".join(lines)
 
     @property
@@ -138,6 +142,7 @@ class Verdict:
             "p99.9": f"{c.p999:.2e}",
             "largest tolerance": f"{c.tolerance:.2e}",
             "most used": f"{share(self.used)} of a pixel's own tolerance",
+            "not judged": ", ".join(self.left_out) or "-",
             "time": ", ".join(f"{name} {seconds:.2f} s" for name, seconds in self.seconds.items()),
         }
         heads = ("x", "y", "object", "triangle", "class", "value", "lowest", "highest", "error", "used", "arises in")
@@ -176,6 +181,7 @@ class Verdict:
             "worst_pixels": [vars(pixel) for pixel in self.worst_pixels],
             "driver": self.driver,
             "seconds": self.seconds,
+            "left_out": list(self.left_out),
         }
 
 

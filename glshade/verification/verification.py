@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from contextlib import ExitStack
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from glshade.image.image import Image
-from glshade.reference.freedom import Freedom, freedom_of
+from glshade.reference.freedom import UNMEASURED, Freedom
 from glshade.scene.models import Folders, use_models
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
-from glshade.verification.candidates import find_candidates, single_sample
+from glshade.verification.candidates import find_candidates, left_out, single_sample
 from glshade.verification.verdict import MAX_AMBIGUOUS, Verdict, verdict_of
 
 Array = NDArray[Any]
@@ -39,33 +41,37 @@ def verify(
     shading: the shading rate for the whole scene; by default, each object has its own.
     max_ambiguous: the largest share of ambiguous pixels in a picture that can be verified.
     picture: optional, an Image or an array (H, W, 3 or 4) [linear, premultiplied] that is judged in place of the GPU's picture.
-    renderer: optional, the Renderer that draws; by default a new one on `backend` and `device`.
+    renderer: optional, the Renderer that draws, or that drew `picture`; by default a new one on `backend` and `device` draws.
     mask: optional (H, W); True for pixels that are not judged and count as ambiguous.
-    driver: the freedom that the specification leaves to the driver; by default, the Freedom that glshade knows for the driver's
-        GL_RENDERER.
+    driver: optional; the errors of the driver's fixed functions. By default they are measured. If only `picture` is given, its
+        driver is not known, and may use the whole freedom that the specification leaves it.
     shaders, models: folders of the user's own shaders and models, as for Renderer.
     Errors: SceneError, ShaderError, ContextError, GlshadeError where `picture` has another size than the scene's.
     """
     from time import perf_counter
 
     use_models(models)
+    not_judged = left_out(scene)
     scene = single_sample(scene)
     start = perf_counter()
     made_by = ""
-    if picture is None:
-        if renderer is None:
+    with ExitStack() as opened:
+        if picture is None and renderer is None:
             from glshade.gl.renderer import Renderer
 
-            with Renderer(backend, device, shaders=shaders) as own:
-                picture, made_by = _drawn(scene, shading, own)
-        else:
+            renderer = opened.enter_context(Renderer(backend, device, shaders=shaders))
+        if picture is None:
             picture, made_by = _drawn(scene, shading, renderer)
+        if driver is None and renderer is not None:
+            from glshade.driver.freedom import measure_freedom
+
+            driver = measure_freedom(renderer.context)
     drawn = perf_counter()
-    expected = find_candidates(scene, shading=shading, driver=driver or freedom_of(made_by))
+    expected = find_candidates(scene, shading=shading, driver=driver or UNMEASURED)
     judged = perf_counter()
     result = verdict_of(np.asarray(getattr(picture, "pixels", picture)), expected, mask, max_ambiguous, made_by)
     result.seconds.update({"draw": drawn - start, "reference": judged - drawn, "judge": perf_counter() - judged})
-    return result
+    return replace(result, left_out=not_judged)
 
 
 def _drawn(scene: Scene, shading: Rate | None, renderer: Any) -> tuple[Array, str]:

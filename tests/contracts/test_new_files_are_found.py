@@ -1,4 +1,4 @@
-"""Property: adding a model, light, picture format, mesh format, command or mutation needs new files and no edits.
+"""Property: adding a model, light, picture format, mesh format, command, mutation or law needs new files and no edits.
 
 A copy of glshade gets one of each, and none of its files is edited: a BRDF and a light are two files, one GLSL and one Python,
 and everything else is one.
@@ -153,6 +153,16 @@ from glshade.verification.mutations._mutation import Mutation
 
 MUTATION = Mutation("dull-felt", "the sheen of felt is 0", edits=((r"m\\.sheen \\*", "0.0 *"),))
 '''
+DOUBLED = '''
+"""doubled: twice the light gives twice the picture, for its own test."""
+from glshade.verification.laws._law import Law
+
+def _picture(scene, draw):
+    lights = tuple(light.model_copy(update={"intensity": 2 * light.intensity}) for light in scene.lights)
+    return draw(scene.model_copy(update={"lights": lights})) / 2
+
+LAW = Law(name="doubled", description="twice the light gives twice the picture", picture=_picture)
+'''
 NEW = {
     "glshade/brdfs/felt.py": FELT,
     "shaders/brdf/felt.glsl": FELT_GLSL,
@@ -164,6 +174,7 @@ NEW = {
     "glshade/mesh/formats/tri.py": TRI,
     "glshade/cli/hello.py": HELLO,
     "glshade/verification/mutations/dull_felt.py": DULL,
+    "glshade/verification/laws/doubled.py": DOUBLED,
     "s.toml": """
 objects = [{ mesh = "m.tri", material = { brdf = "felt", tint = [0.25, 0.5, 1.0] } }]
 lights = [{ type = "lamp", level = -2, intensity = 0.5 }, { type = "dome", intensity = 0.25 }]
@@ -245,6 +256,7 @@ record = json.loads(glshade("render", "s.toml", "-o", "x.tga", "--resume", "--js
 assert os.stat("x.tga").st_mtime_ns == written, record
 assert "dull-felt" in (said := glshade("verify", "s.toml", "--mutate", "dull-felt")) and " caught" in said, said
 assert "verified" in glshade("verify", "s.toml")
+assert glshade("laws", "s.toml", "--only", "doubled").count("holds") == 2
 print("done")
 """
 
@@ -299,7 +311,7 @@ def test_a_model_and_lights_are_drawn_and_verified(here: Callable[[str], str]) -
     assert here(VERIFY) == "verified"
 
 
-def test_commands_formats_and_mutations_are_found(here: Callable[[str], str]) -> None:
+def test_commands_formats_mutations_and_laws_are_found(here: Callable[[str], str]) -> None:
     assert here(COMMANDS) == "done"
 
 

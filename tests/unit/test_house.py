@@ -21,7 +21,7 @@ ROOMS = (
     *("reference", "driver", "verification", "catalogue", "pyrender", "tradeoff", "batch", "bench", "cli"),
 )
 # Modules of no room, which every room may import. They import no room.
-BASE = {"errors", "found", "document", "files", "arrays", "version", "lru"}
+BASE = {"errors", "found", "document", "files", "limits", "arrays", "version", "lru"}
 # `python -m glshade` runs the command line.
 ENTRIES = {"", "__main__"}
 # docs/tradeoff.md names glshade.tradeoff.study.study, and what is documented keeps its name.

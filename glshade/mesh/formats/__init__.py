@@ -13,27 +13,22 @@ from glshade.errors import AssetError
 
 if TYPE_CHECKING:
     from glshade.mesh.reading.contents import Contents
+    from glshade.mesh.reading.file import MeshFile
 
 # The suffixes of all mesh formats, with the dot, in lower case and sorted.
 SUFFIXES = tuple(sorted(f".{path.stem}" for path in Path(__file__).parent.glob("*.py") if not path.stem.startswith("_")))
 
 
-def read(path: Path, folder: Path, data: bytes) -> Contents:
-    """Returns the contents of a mesh file.
-
-    path: the file as the user wrote it, for messages; its suffix is one of SUFFIXES.
-    folder: the absolute path of the folder in which the file finds its materials, textures and buffers.
-    data: the bytes of the file.
+def read(file: MeshFile) -> Contents:
+    """Returns the contents of a mesh file whose suffix is one of SUFFIXES.
 
     Errors: AssetError, one line that starts with the path, if the file is broken or holds nothing to draw.
     """
     import importlib
 
-    from glshade.mesh.reading.file import MeshFile
     from glshade.mesh.reading.parser import quiet
 
-    suffix = path.suffix.lower()
-    file = MeshFile(path, folder, data)
+    suffix = file.path.suffix.lower()
     try:
         with quiet():
             importlib.import_module(f"glshade.mesh.formats{suffix}").read(file)

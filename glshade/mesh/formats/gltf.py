@@ -55,6 +55,7 @@ def read(file: MeshFile) -> None:
         meshes.append({"name": f"{number}", "primitives": primitives})
     if not kept:
         raise file.fail("holds only points or lines, no triangles" if others else "holds no triangles")
+    _check_size(file, accessors, buffers, [primitive for _, primitive in kept])
     plain = {
         "asset": {"version": "2.0"},
         "buffers": [{"uri": str(index), "byteLength": len(data)} for index, data in enumerate(buffers)],
@@ -110,6 +111,24 @@ def read(file: MeshFile) -> None:
             stored.setdefault(id(mesh), len(file.contents.meshes) - 1)
 
 
+def _check_size(
+    file: MeshFile, accessors: list[dict[str, Any]], buffers: list[bytes], primitives: list[dict[str, Any]]
+) -> None:
+    """Checks the number of triangles before they are read. Primitives may share accessors, and an accessor needs no data.
+
+    Errors: AssetError for more triangles than the file stores one by one, and than the limits allow.
+    """
+    used = [accessors[p["indices"] if "indices" in p else p["attributes"]["POSITION"]]["count"] for p in primitives]
+    vertices = [accessors[index]["count"] for p in primitives for index in p["attributes"].values()]
+    # An index takes at least one byte. A vertex takes more, and it may be shared by six triangles.
+    count = max(sum(used), sum(vertices) // 2)
+    if count > max(3 * file.limits.max_triangles, len(file.data) + sum(map(len, buffers))):
+        raise file.fail(
+            f"its meshes have {count // 3:,} triangles, more than it stores; {file.limits.max_triangles:,} are allowed: "
+            "see --max-triangles"
+        )
+
+
 def _nodes(file: MeshFile, header: dict[str, Any]) -> Iterator[tuple[str | None, int, Float64]]:
     """Yields (name, number of the mesh, transform (4, 4) to file space) for every node with a mesh in the scene of the file.
 
@@ -128,25 +147,28 @@ def _nodes(file: MeshFile, header: dict[str, Any]) -> Iterator[tuple[str | None,
         yield from ((None, number, np.eye(4)) for number in range(len(header.get("meshes", []))))
     # The nodes are visited depth first in the order of the file, and without recursion, because a chain of nodes may be longer
     # than Python's stack is deep.
-    waiting: list[tuple[int, Float64, tuple[int, ...]]] = [(root, np.eye(4), ()) for root in reversed(roots)]
-    seen: set[int] = set()
+    waiting: list[tuple[int, Float64, int | None]] = [(root, np.eye(4), None) for root in reversed(roots)]
+    # Node -> the node from which it was reached.
+    seen: dict[int, int | None] = {}
     while waiting:
-        index, parent, ancestors = waiting.pop()
-        if index in ancestors:
-            raise file.fail(f"its nodes form a cycle: node {index} is its own ancestor")
+        index, parent, above = waiting.pop()
         if index in seen:
+            while above is not None and above != index:
+                above = seen[above]
+            if above is not None:
+                raise file.fail(f"its nodes form a cycle: node {index} is its own ancestor")
             raise file.fail(f"node {index} has two parents; glTF nodes form a tree")
         if not 0 <= index < len(nodes):
             raise file.fail(f"node {index} does not exist")
-        seen.add(index)
+        seen[index] = above
         node = nodes[index]
-        transform = parent @ _transform(node)
+        with np.errstate(all="ignore"):
+            transform = parent @ _transform(node)
         if not np.isfinite(transform).all():
             raise file.fail(f"node {index} has a transform that is not finite")
         if "mesh" in node:
             yield node.get("name"), node["mesh"], transform
-        below = (*ancestors, index)
-        waiting += [(child, transform, below) for child in reversed(node.get("children", []))]
+        waiting += [(child, transform, index) for child in reversed(node.get("children", []))]
 
 
 def _transform(node: dict[str, Any]) -> Float64:

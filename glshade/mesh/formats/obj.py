@@ -8,14 +8,16 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 
 from glshade.arrays import Float64
+from glshade.limits import MOST_LIBRARIES
 from glshade.mesh.reading import mtl
 from glshade.mesh.reading.colours import srgb_to_linear, with_alpha
 from glshade.mesh.reading.contents import Material
-from glshade.mesh.reading.file import MeshFile, text_of
+from glshade.mesh.reading.file import OUTSIDE, MeshFile, is_file, short, text_of
 from glshade.mesh.reading.parser import parse, triangles
 from glshade.mesh.reading.polygon import triangulated
 
@@ -188,13 +190,20 @@ def _in_range(
 def _materials_of(file: MeshFile, libraries: list[str]) -> dict[str, Material]:
     """Returns the materials by name. libraries: the text of each "mtllib" line without its first word."""
     materials: dict[str, Material] = {}
+    seen: set[Path] = set()
     for line in libraries:
         # The whole line may be one name with spaces, or several names.
-        names = [line] if file.beside(line).is_file() else line.split()
+        names = [line] if is_file(file.beside(line)) else line.split()
         for name in names:
-            data = file.read(file.beside(name))
+            path = file.beside(name)
+            if path in seen:
+                continue
+            seen.add(path)
+            if len(seen) > MOST_LIBRARIES:
+                raise file.fail(f"names more than {MOST_LIBRARIES} material files")
+            data = None if (outside := file.is_outside(path)) else file.read(path)
             if data is None:
-                file.warn(f"material file '{name}' not found; drawn without its materials")
+                file.warn(f"material file '{short(name)}' {OUTSIDE if outside else 'not found'}; drawn without its materials")
             else:
                 materials = mtl.materials(file, text_of(data)) | materials
     return materials

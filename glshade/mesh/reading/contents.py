@@ -7,6 +7,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from glshade.arrays import Float64
+from glshade.errors import printable
 from glshade.mesh.mesh import Mesh
 from glshade.mesh.order import ordered
 
@@ -34,11 +35,13 @@ class Contents:
         self.images: dict[str, bytes] = {}
         self.dependencies: dict[str, str | None] = {}
         self.warnings: list[str] = []
+        # Name that was given or made -> the number that was last appended to it.
+        self._used: dict[str, int] = {}
 
     def add(self, name: str, mesh: Mesh | int, material: Material | None = None, transform: Float64 | None = None) -> None:
         """Adds a part.
 
-        name: a number is appended where another part has the same name.
+        name: a number is appended where another part has the same name. Control characters are replaced.
         mesh: a mesh, or the index of one that was added already.
         material: optional, in the form of a scene file.
         transform: (4, 4), from object space to file space. Default: the identity.
@@ -46,10 +49,11 @@ class Contents:
         if isinstance(mesh, Mesh):
             self.meshes.append(ordered(mesh))
             mesh = len(self.meshes) - 1
-        taken = {part["name"] for part in self.parts}
-        unique, count = name, 1
-        while unique in taken:
+        unique, count = printable(name), self._used.get(name, 1)
+        while unique in self._used:
             count += 1
-            unique = f"{name}.{count}"
+            unique = f"{printable(name)}.{count}"
+        self._used[name] = count
+        self._used.setdefault(unique, 1)
         rows = (np.eye(4) if transform is None else transform).tolist()
         self.parts.append({"name": unique, "mesh": mesh, "transform": rows, "material": material})

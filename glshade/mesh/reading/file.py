@@ -8,8 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from glshade.errors import AssetError
+from glshade.files import read_bytes
+from glshade.limits import DEFAULT, LARGEST_MESH, Limits
 from glshade.mesh.mesh import Mesh
 from glshade.mesh.reading.contents import Contents
+
+# The end of a message about a file that must not be named.
+OUTSIDE = "lies outside the folders of the mesh and the scene's files (--allow-outside reads it)"
 
 
 @dataclass
@@ -20,12 +25,22 @@ class MeshFile:
     folder: the absolute path of the folder in which the file lies.
     data: the bytes of the file.
     contents: everything that the reader has found so far.
+    limits: the limits of the scene that names the file.
+    folders: the folders, without symbolic links, in which the file may name other files.
+    normal_maps: picture file -> whether it holds normals, for the pictures that the reader has looked at.
     """
 
     path: Path
     folder: Path
     data: bytes
     contents: Contents = field(default_factory=Contents)
+    limits: Limits = DEFAULT
+    folders: frozenset[Path] = frozenset()
+    normal_maps: dict[Path, bool] = field(default_factory=dict)
+    # Folder -> the files in it, by their names in lower case.
+    _listed: dict[Path, dict[str, Path]] = field(default_factory=dict)
+    # Path -> the bytes that were read, because a file may name another one many times.
+    _read: dict[Path, bytes | None] = field(default_factory=dict)
 
     def fail(self, message: str) -> AssetError:
         """Returns an error to raise: one line that starts with the path."""
@@ -45,32 +60,55 @@ class MeshFile:
         """
         name = name.replace("\\", "/")
         exact = self.folder / name
-        if exact.is_file():
+        if is_file(exact):
             return exact
-        for folder in (exact.parent, self.folder):
-            if folder.is_dir():
-                for found in sorted(folder.iterdir()):
-                    if found.name.lower() == exact.name.lower() and found.is_file():
-                        return found
+        for folder in (self.folder,) if self.is_outside(exact.parent) else (exact.parent, self.folder):
+            found = self._files(folder).get(exact.name.lower())
+            if found is not None:
+                return found
         return exact
 
-    def read(self, path: Path) -> bytes | None:
-        """Returns the bytes of a file on which this one depends; None where it cannot be read."""
+    def _files(self, folder: Path) -> dict[str, Path]:
+        """Returns the files in a folder, by their names in lower case; none where the folder cannot be read."""
+        if folder not in self._listed:
+            try:
+                paths = sorted(folder.iterdir(), reverse=True)
+            except (OSError, ValueError):
+                paths = []
+            self._listed[folder] = {path.name.lower(): path for path in paths if is_file(path)}
+        return self._listed[folder]
+
+    def is_outside(self, path: Path) -> bool:
+        """Whether this file must not name a path, because it leads out of the folders once its symbolic links are resolved."""
+        if self.limits.allow_outside:
+            return False
         try:
-            data = path.read_bytes()
-        except OSError:
-            self.contents.dependencies[str(path)] = None
-            return None
-        self.contents.dependencies[str(path)] = hashlib.sha256(data).hexdigest()
-        return data
+            real = path.resolve()
+        except (OSError, RuntimeError, ValueError):  # a loop of links, or a name that no file can have
+            return True
+        return not any(real.is_relative_to(folder) for folder in self.folders)
+
+    def read(self, path: Path) -> bytes | None:
+        """Returns the bytes of a file on which this one depends; None where it cannot be read.
+
+        The caller must have made sure that the file is not outside.
+        """
+        if path not in self._read:
+            try:
+                data = self._read[path] = read_bytes(path, LARGEST_MESH)
+                self.contents.dependencies[str(path)] = hashlib.sha256(data).hexdigest()
+            except (OSError, ValueError):
+                self._read[path] = self.contents.dependencies[str(path)] = None
+        return self._read[path]
 
     def texture(self, name: str) -> str | None:
-        """Returns the absolute path of a texture; None, with a warning, where it is missing."""
+        """Returns the absolute path of a texture; None, with a warning, where it is missing or outside."""
         path = self.beside(name)
-        found = path.is_file()
+        outside = self.is_outside(path)
+        found = not outside and is_file(path)
         self.contents.dependencies[str(path)] = "present" if found else None
         if not found:
-            self.warn(f"texture '{name}' not found; drawn without it")
+            self.warn(f"texture '{short(name)}' {OUTSIDE if outside else 'not found'}; drawn without it")
         return str(path) if found else None
 
     def build(self, where: str, *arrays: Any, **named: Any) -> Mesh:
@@ -79,6 +117,19 @@ class MeshFile:
             return Mesh.build(*arrays, **named)
         except AssetError as error:
             raise self.fail(f"{where}{error}") from None
+
+
+def short(name: str) -> str:
+    """Returns a name for a message, without its middle where it is very long."""
+    return name if len(name) <= 200 else f"{name[:100]} ... {name[-90:]}"
+
+
+def is_file(path: Path) -> bool:
+    """Whether a path leads to a regular file. A name that no file can have leads to none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def text_of(data: bytes) -> str:

@@ -8,7 +8,7 @@ import struct
 from typing import Any
 from urllib.parse import unquote
 
-from glshade.mesh.reading.file import MeshFile
+from glshade.mesh.reading.file import OUTSIDE, MeshFile, short
 
 # The first bytes of the binary form.
 MAGIC = b"glTF"
@@ -47,9 +47,7 @@ def opened(file: MeshFile) -> tuple[dict[str, Any], list[bytes]]:
     buffers = []
     for index, buffer in enumerate(header.get("buffers", [])):
         if "uri" in buffer:
-            found = _uri(file, buffer["uri"])
-            if found is None:
-                raise file.fail(f"its buffer '{unquote(buffer['uri'])}' is missing")
+            found = _uri(file, index, buffer["uri"])
         elif index == 0 and binary is not None:
             found = binary
         else:
@@ -60,8 +58,18 @@ def opened(file: MeshFile) -> tuple[dict[str, Any], list[bytes]]:
     return header, buffers
 
 
-def _uri(file: MeshFile, uri: str) -> bytes | None:
-    """Returns the bytes of a data URI, or of the file that a relative URI names; None where that file is missing."""
+def _uri(file: MeshFile, index: int, uri: str) -> bytes:
+    """Returns the bytes of buffer number `index`: those of a data URI, or of the file that a relative URI names.
+
+    Errors: AssetError where that file is missing or outside.
+    """
     if uri.startswith("data:"):
         return base64.b64decode(uri.partition(",")[2])
-    return file.read(file.beside(unquote(uri)))
+    name = unquote(uri)
+    path = file.beside(name)
+    if file.is_outside(path):
+        raise file.fail(f"buffers[{index}].uri: '{short(name)}' {OUTSIDE}")
+    data = file.read(path)
+    if data is None:
+        raise file.fail(f"its buffer '{short(name)}' is missing")
+    return data

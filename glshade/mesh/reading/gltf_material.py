@@ -10,6 +10,8 @@ from urllib.parse import unquote
 from glshade.mesh.reading.contents import EMBEDDED, Material
 from glshade.mesh.reading.file import MeshFile
 
+# The size of the embedded pictures, in sizes of the file and its buffers.
+LARGEST_EMBEDDED = 4
 # OpenGL's number of a wrap mode -> its name in a scene file.
 WRAP_MODES = {33071: "clamp", 33648: "mirror", 10497: "repeat"}
 
@@ -193,4 +195,7 @@ def _texture(
         suffix = ".webp" if data[8:12] == b"WEBP" else ".image"
     name = f"image{source}{suffix}"
     file.contents.images[name] = data
+    # Pictures may share bytes of a buffer, so that together they are larger than the file.
+    if sum(map(len, file.contents.images.values())) > LARGEST_EMBEDDED * (len(file.data) + sum(map(len, buffers))):
+        raise file.fail(f"its pictures are together more than {LARGEST_EMBEDDED} times as large as its buffers")
     return EMBEDDED + name, wrap

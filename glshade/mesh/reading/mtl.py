@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from glshade.errors import AssetError
+from glshade.limits import TEXELS_PER_BYTE
 from glshade.mesh.reading.contents import Material
 from glshade.mesh.reading.file import MeshFile
 
@@ -88,13 +89,18 @@ def _holds_normals(file: MeshFile, texture: str) -> bool:
     """Returns whether the picture of a bump map holds normals instead of heights. Many programs write such files."""
     from glshade.image import file as picture_file
 
-    # The material depends on the content of the picture, not only on its existence, so the picture becomes a full dependency.
-    file.read(Path(texture))
-    try:
-        pixels, _ = picture_file.read(texture, "linear")
-    except AssetError:
-        return False  # the renderer reports the broken picture
-    return float((pixels[..., 2] - pixels[..., 0]).mean()) > BLUER
+    path = Path(texture)
+    if path not in file.normal_maps:
+        # The material depends on the content of the picture, not only on its existence, so it becomes a full dependency.
+        data = file.read(path)
+        try:
+            # The renderer reports a picture that is broken or too large.
+            fits = picture_file.pixel_count(path) <= max(file.limits.max_texels, TEXELS_PER_BYTE * len(data or b""))
+            pixels = picture_file.read(path, "linear")[0] if fits else None
+        except AssetError:
+            pixels = None
+        file.normal_maps[path] = pixels is not None and float((pixels[..., 2] - pixels[..., 0]).mean()) > BLUER
+    return file.normal_maps[path]
 
 
 # The options of a texture statement, with the number of words that follow each. The last two of -o, -s and -t are optional.
@@ -104,12 +110,20 @@ _MAP_OPTIONS = {
 }  # fmt: skip
 
 
+# Options are read one after another, in a time that grows with the square of the statement's length [characters].
+LONGEST_STATEMENT = 10_000
+
+
 def _map_statement(file: MeshFile, statement: str) -> tuple[str | None, dict[str, list[str]], float]:
     """Returns the path of a texture (None if it is missing), its wrap modes and its bump multiplier (-bm).
 
     The file's name may contain spaces.
     """
-    wrap, strength = {}, 1.0
+    wrap: dict[str, list[str]] = {}
+    strength = 1.0
+    if len(statement) > LONGEST_STATEMENT:
+        file.warn(f"a texture statement of {len(statement):,} characters is left out")
+        return None, wrap, strength
     while statement.startswith("-") and statement.split()[0].lower() in _MAP_OPTIONS:
         option, *words = statement.split()
         taken = _MAP_OPTIONS[option.lower()]

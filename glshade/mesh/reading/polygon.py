@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from glshade.limits import MOST_CORNERS
+
 
 def triangulated(outline: npt.ArrayLike) -> list[tuple[int, int, int]]:
     """Returns the triangles, as indices of corners, of a polygon (N, 3) that is nearly flat and does not cross itself.
 
     The triangles have the orientation of the polygon. A convex polygon becomes a fan around its first corner. Any other polygon
-    is cut up ear by ear (Meisters 1975).
+    is cut up ear by ear (Meisters 1975). Errors: ValueError for one with more than MOST_CORNERS corners.
     """
     p = np.asarray(outline, dtype=np.float64)
     count = len(p)
@@ -29,6 +31,8 @@ def triangulated(outline: npt.ArrayLike) -> list[tuple[int, int, int]]:
 
     if all(turn(k - 1, k, (k + 1) % count) >= 0 for k in range(count)):
         return fan
+    if count > MOST_CORNERS:
+        raise ValueError(f"a polygon that is not convex has {count:,} corners; {MOST_CORNERS:,} are allowed")
     left = list(range(count))
     ears = []
     while len(left) > 3:

@@ -131,7 +131,40 @@ class TestCrash:
 
 
 class TestResume:
-    """--resume skips a picture if its file holds the digest of this picture."""
+    """--resume skips a picture if its files hold exactly this picture."""
+
+    @pytest.mark.parametrize("suffix", ["png", "jpg", "exr", "hdr", "tif"])
+    def test_a_damaged_picture_is_made_again(self, suffix: str, run: Any, folder: Path) -> None:
+        render = ("-f", "1-4", "-o", f"f.#.{suffix}", "--jobs", "1", "--resume")
+        run(*render)
+        good = [Path(f"f.{frame}.{suffix}").read_bytes() for frame in range(1, 5)]
+        middle = len(good[1]) // 2
+        flipped = good[1][:middle] + bytes([good[1][middle] ^ 1]) + good[1][middle + 1 :]
+        for frame, damaged in ((1, good[0][:middle]), (2, flipped), (3, good[2][:-12])):
+            Path(f"f.{frame}.{suffix}").write_bytes(damaged)
+        assert sorted(run(*render).stdout.split()) == [f"f.{frame}.{suffix}" for frame in (1, 2, 3)]
+        assert [Path(f"f.{frame}.{suffix}").read_bytes() for frame in range(1, 5)] == good
+
+    def test_without_the_manifest_pictures_are_compared_with_new_ones(self, run: Any, folder: Path) -> None:
+        render = ("-f", "1-2", "-o", "f.#.png", "--jobs", "1", "--resume")
+        run(*render)
+        Path("manifest.jsonl").unlink()
+        good, before = Path("f.1.png").read_bytes(), Path("f.2.png").stat().st_mtime_ns
+        Path("f.1.png").write_bytes(good[:-20])
+        assert run(*render).stdout == "f.1.png\n"
+        assert Path("f.1.png").read_bytes() == good
+        assert Path("f.2.png").stat().st_mtime_ns == before
+        assert len(Path("manifest.jsonl").read_text().splitlines()) == 2
+
+    def test_a_damaged_layers_file_is_made_again(self, run: Any, folder: Path) -> None:
+        render = ("-f", "1-2", "-o", "f.#.png", "--jobs", "1", "--aov", "depth", "--resume")
+        run(*render)
+        layers = Path("f.1.aovs.exr")
+        good = layers.read_bytes()
+        layers.write_bytes(good[:-20])
+        assert run(*render).stdout == "f.1.png\n"
+        assert layers.read_bytes() == good
+        assert run(*render).stdout == ""
 
     def test_only_missing_and_different_pictures_are_made(self, run: Any, folder: Path) -> None:
         render = ("-f", "1-4", "-o", "f.#.png", "--resume")

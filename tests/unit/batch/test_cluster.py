@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import json
 import os
 import random
@@ -295,6 +296,32 @@ def test_a_lost_scheduler_is_reported_and_the_batch_can_be_resumed(
     check(resumed, expected, before)
 
 
+def test_a_local_cluster_shows_no_pages(scene: Path, tmp_path: Path) -> None:
+    """Other users of the machine can connect to its ports."""
+    batch = Batch(scene, tmp_path / "out", *LOCAL, **workers_do(SLOWLY, tmp_path))
+    batch.wait_for(2)
+    processes = [psutil.Process(batch.process.pid), *batch.children()]
+    ports = [link.laddr.port for p in processes for link in p.net_connections("tcp") if link.status == psutil.CONN_LISTEN]
+    pages = ("status", "info/main/workers.html", "json/counts.json", "metrics")
+    answers = [answer(port, page) for port in ports for page in pages]
+    batch.process.send_signal(signal.SIGINT)
+    batch.ended()
+    assert 404 in answers
+    assert set(answers) <= {404, None}
+
+
+def answer(port: int, page: str) -> int | None:
+    """Returns the HTTP status of a page on this machine; None if the port is not one of an HTTP server."""
+    link = http.client.HTTPConnection("127.0.0.1", port, timeout=10)
+    try:
+        link.request("GET", f"/{page}")
+        return link.getresponse().status
+    except (http.client.HTTPException, OSError):
+        return None
+    finally:
+        link.close()
+
+
 def test_no_scheduler_at_the_address(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(cluster, "CONNECTING", 0.3)
     with pytest.raises(GlshadeError, match=r"no dask scheduler answers at tcp://127\.0\.0\.1:9: ") as caught:
@@ -357,7 +384,7 @@ def test_the_environment_of_a_worker_selects_its_device(conditions: parcel.Condi
         parcel.make([], {**conditions, "device": 0})
 
 
-def test_a_picture_written_since_it_was_handed_out_is_not_drawn_again(
+def test_a_picture_written_since_it_was_handed_out_is_not_written_again(
     conditions: parcel.Conditions, scene: Path, tmp_path: Path
 ) -> None:
     output = tmp_path / "1.png"
@@ -369,7 +396,7 @@ def test_a_picture_written_since_it_was_handed_out_is_not_drawn_again(
     assert output.stat().st_mtime_ns == written
     assert again["state"] == "done"
     assert again["sha256"] == first["sha256"]
-    # With --overwrite the file existed before the task was handed out, so it is drawn again.
+    # With --overwrite the file existed before the task was handed out, so it is written again.
     parcel.make([(task, written)], conditions)
     assert output.stat().st_mtime_ns > written
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from glshade.batch.manifest import Manifest
+from glshade.batch.manifest import Manifest, NoManifest
 from glshade.batch.record import Record
 from glshade.batch.task import Task
 from glshade.errors import GlshadeError
@@ -99,8 +99,36 @@ def test_files_that_cannot_be_a_manifest(tmp_path: Path) -> None:
             manifest.add(TASK, DONE)
 
 
+@pytest.mark.parametrize("text", ["buy milk", "milk\nbread\n", '{"a": 1}\n', "[" * 200_000, "\n", '{"output" 1'])
+def test_another_file_is_left_as_it_is(text: str, path: Path) -> None:
+    path.write_text(text)
+    with pytest.raises(NoManifest, match="is not a manifest") as caught:
+        Manifest(path)
+    assert caught.value.exit_code == 2
+    assert path.read_text() == text
+
+
+def test_the_command_leaves_another_file_as_it_is(tmp_path: Path, glshade: Any) -> None:
+    (tmp_path / "s.toml").write_text('objects = [{ shape = "sphere" }]')
+    (tmp_path / "notes.txt").write_text("buy milk")
+    done = glshade("render", "s.toml", "-o", "x.png", "--manifest", "notes.txt", cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stderr == "glshade: notes.txt: is not a manifest, and is left as it is: name another file\n"
+    assert (tmp_path / "notes.txt").read_text() == "buy milk"
+    assert not (tmp_path / "x.png").exists()
+
+
+def test_a_line_that_no_parser_can_read_is_skipped(path: Path, tmp_path: Path) -> None:
+    with Manifest(path) as manifest:
+        manifest.add(TASK, record(tmp_path, "a.png"))
+    with path.open("a") as file:
+        file.write("[" * 200_000 + "\n")
+    with Manifest(path) as manifest:
+        assert manifest.known(str(tmp_path / "a.png")) == DONE.known == ("d", "s")
+
+
 def test_tasks_and_records_go_through_json(tmp_path: Path) -> None:
-    task = replace(TASK, film={"size": [3, 2]}, settings=({"shading": "flat"},), resume=True, output="x.png")
+    task = replace(TASK, film={"size": [3, 2]}, settings=({"shading": "flat"},), resume=True, known=("d", "s"), output="x.png")
     assert Task.from_dict(json.loads(json.dumps(task.as_dict()))) == task
     assert Task.from_dict(Task(0, "s", "o").as_dict()) == Task(0, "s", "o")
     result = replace(DONE, output="x.png", device=0, warnings=("a", "b"), stops=True)

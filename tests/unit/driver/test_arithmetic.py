@@ -29,7 +29,9 @@ def test_llvmpipe(found: dict[str, Any]) -> None:
     assert found["fma"]["fused"] is False
     assert found["contracted"] == {"vertex": False, "fragment": False}
     assert found["precise"]["kept"] is True
-    assert found["loop_rounds"]["fragment"] == found["loop_rounds"]["vertex"] == 65535
+    # Mesa 22 ends a loop after 65,535 rounds; Mesa 25 runs all that are tried. No loop of glshade is longer.
+    rounds = found["loop_rounds"]
+    assert rounds["tried"] >= rounds["fragment"] == rounds["vertex"] >= 65_535
 
 
 @pytest.mark.parametrize("function", FUNCTIONS, ids=lambda function: function.name)

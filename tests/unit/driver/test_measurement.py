@@ -21,7 +21,8 @@ def test_the_result_is_json(found: dict[str, Any]) -> None:
     json.dumps(found, allow_nan=False)
     assert list(found) == [
         *("built_ins", "fma", "contracted", "precise", "compensated_sum_without_precise", "mix_at_its_end", "denormals"),
-        *("loop_rounds", "formats", "timer_query", "subpixel_bits", "interpolation_shift_in_steps", "sample_positions"),
+        *("loop_rounds", "formats", "timer_query", "subpixel_bits", "interpolation_shift_in_steps", "clips_at_sides"),
+        *("sample_positions", "level_of_detail", "filter_weight_error"),
     ]
 
 

@@ -346,7 +346,17 @@ def test_another_driver_finds_nothing(context: Context, monkeypatch: pytest.Monk
     with monkeypatch.context() as patch:
         patch.setattr("glshade.gl.linker.__version__", "99.0")
         keys.append(key(window))
-    assert len(set(keys)) == 4
+    with monkeypatch.context() as patch:
+        patch.setattr("glshade.gl.linker.processor", lambda: "flags: another")
+        keys.append(key(window))
+    for name, value in (("LP_NATIVE_VECTOR_WIDTH", "128"), ("GALLIVM_PERF", "nopt"), ("MESA_GLSL", "nopt")):
+        with monkeypatch.context() as patch:
+            patch.setenv(name, value)
+            keys.append(key(window))
+    assert len(set(keys)) == 8
+    # The workers of a batch draw with fewer threads than a command that makes one picture.
+    monkeypatch.setenv("LP_NUM_THREADS", "3")
+    monkeypatch.setenv("MESA_SHADER_CACHE_DIR", "elsewhere")
     assert key(window) == keys[0]
     linker = Linker(window, binaries, "egl")
     assert len({linker.key("ab", "c"), linker.key("a", "bc"), linker.key("a", None), linker.key("ab", None)}) == 4

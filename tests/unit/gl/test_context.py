@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,7 @@ import pytest
 
 import glshade
 from glshade import BRDFS, ContextError, Renderer, Scene, evaluate
+from glshade.assembly.part import Part
 from glshade.gl.context import REQUIRED_VERSION, devices, open_context
 
 SCENE = Scene(objects=[{"shape": "sphere"}], film={"size": (24, 16), "samples": 4})
@@ -72,6 +74,53 @@ def test_a_renderer_may_be_released_twice() -> None:
     with Renderer() as renderer:
         renderer.render(SCENE)
         renderer.release()
+
+
+def test_a_released_renderer_says_so() -> None:
+    renderer = Renderer()
+    image = renderer.render(SCENE)
+    draw = renderer.drawing(SCENE)
+    prepared = renderer.prepare(SCENE, None, "linear")
+    part = Part("lit")
+    renderer.release()
+    for use in (
+        lambda: renderer.render(SCENE),
+        lambda: renderer.layers(SCENE),
+        lambda: renderer.surfaces(SCENE),
+        lambda: next(renderer.draw_part(SCENE, part)),
+        lambda: renderer.drawing(SCENE),
+        draw,
+        lambda: renderer.prepare(SCENE, None, "linear"),
+        lambda: renderer.prepare(SCENE, "flat", "linear"),
+        lambda: renderer.draw(prepared, np.eye(4, dtype=np.float32)),
+        lambda: evaluate(BRDFS["lambert"](), [0, 0, 1], [0, 0, 1], on="fragment", context=renderer.context),
+    ):
+        with pytest.raises(ContextError, match="has been released"):
+            use()
+    assert renderer.context.renderer
+    assert image.pixels.mean() > 0
+
+
+@pytest.mark.parametrize("command", [("render", "s.toml", "-o", "x.png"), ("doctor",)])
+@pytest.mark.parametrize("backend", ["auto", "egl", "osmesa"])
+def test_a_driver_that_does_not_exist(command: tuple[str, ...], backend: str, tmp_path: Path, glshade: Any) -> None:
+    """With such a name, OSMesa crashes the process that makes a context."""
+    (tmp_path / "s.toml").write_text('objects = [{ shape = "sphere" }]')
+    done = glshade(*command, "--backend", backend, cwd=tmp_path, GALLIUM_DRIVER="nosuch")
+    assert done.returncode == 5
+    assert "Traceback" not in done.stderr
+    assert "GALLIUM_DRIVER=nosuch" in done.stdout + done.stderr or "cannot be loaded" in done.stdout + done.stderr
+    assert not (tmp_path / "x.png").exists()
+
+
+@pytest.mark.parametrize("width", ["64", "512"])
+def test_a_width_of_vectors_with_which_llvmpipe_crashes(width: str, tmp_path: Path, glshade: Any, renderer: Renderer) -> None:
+    if "llvmpipe" not in renderer.context.renderer:
+        pytest.skip("the driver is not llvmpipe")
+    (tmp_path / "s.toml").write_text('objects = [{ shape = "sphere" }]')
+    done = glshade("render", "s.toml", "-o", "x.png", cwd=tmp_path, LP_NATIVE_VECTOR_WIDTH=width)
+    assert done.returncode == 5
+    assert f"llvmpipe crashes with vectors of {width} bits" in done.stderr
 
 
 def test_an_image_outlives_its_renderer() -> None:

@@ -337,6 +337,21 @@ def test_build_refuses_what_cannot_be_drawn(positions: Any, triangles: Any, mess
         Mesh.build(positions, triangles)
 
 
+def test_a_mesh_has_arrays_of_its_own() -> None:
+    positions = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype=np.float32)
+    triangles, origin = np.array([[0, 1, 2]], dtype=np.uint32), np.zeros(3)
+    # The view is read-only, but its owner is not.
+    view = positions.view()
+    view.flags.writeable = False
+    meshes = [Mesh(given, triangles, normals=given, origin=origin) for given in (positions, view)]
+    before = [mesh.digest for mesh in meshes]
+    positions[:], triangles[:], origin[:] = 5, 0, 5
+    for mesh, digest in zip(meshes, before, strict=True):
+        assert mesh.positions[1].tolist() == [1, 0, 0]
+        assert Mesh(mesh.positions, mesh.triangles, mesh.normals, origin=mesh.origin).digest == digest
+        assert Mesh(mesh.positions, mesh.triangles).positions is mesh.positions, "what nobody can write to is not copied"
+
+
 def test_arrays_are_read_only_and_the_digest_is_of_their_bytes() -> None:
     mesh = shared_cube()
     with pytest.raises(ValueError, match="read-only"):

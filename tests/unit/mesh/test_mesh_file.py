@@ -44,6 +44,13 @@ def forget() -> None:
     mesh_file._memory.clear()
 
 
+def flip_a_bit(file: Path, place: int) -> None:
+    """Changes one bit of the byte at a place of a file."""
+    data = bytearray(file.read_bytes())
+    data[place] ^= 1
+    file.write_bytes(data)
+
+
 def written(tmp_path: Path, name: str, content: str | bytes) -> Path:
     path = tmp_path / name
     path.parent.mkdir(parents=True, exist_ok=True)
@@ -674,7 +681,7 @@ def test_equal_files_in_two_folders_keep_their_own_textures(tmp_path: Path) -> N
         assert material["kd"]["texture"] == str(tmp_path / folder / "a.png")
 
 
-@pytest.mark.parametrize("damage", ["truncated", "garbage", "removed", "indices", "json"])
+@pytest.mark.parametrize("damage", ["truncated", "garbage", "removed", "indices", "json", "bit"])
 def test_a_damaged_entry_is_replaced(tmp_path: Path, own_cache: Path, monkeypatch: pytest.MonkeyPatch, damage: str) -> None:
     path = written(tmp_path, "a.obj", TRIANGLE + "f 1 2 3\n")
     good = only(load(path)).digest
@@ -684,6 +691,8 @@ def test_a_damaged_entry_is_replaced(tmp_path: Path, own_cache: Path, monkeypatc
         file.unlink()
     elif damage == "indices":
         np.save(file, np.array([[0, 1, 99]], dtype=np.uint32))
+    elif damage == "bit":
+        flip_a_bit(file, -1)
     else:
         file.write_bytes(file.read_bytes()[:-4] if damage == "truncated" else b"{garbage")
     forget()
@@ -721,6 +730,25 @@ def test_an_entry_that_was_pruned_is_written_again(tmp_path: Path, own_cache: Pa
     found = load(path).parts[0].material
     assert found is not None
     assert Path(found["kd"]["texture"]).read_bytes() == PNG
+
+
+@pytest.mark.parametrize("name", ["0.positions.npy", "entry.json", "image"])
+def test_a_bit_of_an_entry_flips(name: str, tmp_path: Path, own_cache: Path) -> None:
+    """Any bit counts: the last digit of a factor in entry.json would still be valid JSON."""
+    material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0}, "metallicFactor": 0.25}}
+    header, blob = gltf({"POSITION": POSITIONS, "TEXCOORD_0": UVS}, materials=[material])
+    header["images"] = [{"uri": "data:image/png;base64," + base64.b64encode(PNG).decode()}]
+    header["textures"] = [{"source": 0}]
+    path = written(tmp_path, "a.glb", glb(header, blob))
+    load(path)
+    (entry,) = (own_cache / "glshade" / "meshes").iterdir()
+    good = {file.name: file.read_bytes() for file in entry.iterdir()}
+    (image,) = (file for file in good if not file.endswith((".npy", ".json")))
+    file = entry / (image if name == "image" else name)
+    flip_a_bit(file, file.read_bytes().index(b"0.25") + 3 if name == "entry.json" else -1)
+    forget()
+    load(path)
+    assert {file.name: file.read_bytes() for file in entry.iterdir()} == good
 
 
 # --- real files ------------------------------------------------------------------------------------------------------

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.glsl import called
 
-from glshade import Renderer
+from glshade import BRDFS, Renderer
 from glshade.optics.fresnel import f0_conductor, f_conductor, f_dielectric, f_schlick, t0_conductor, t_conductor, t_schlick
 
 COS = np.concatenate([[1e-30, 1e-7, 1e-4], np.linspace(1e-3, 1, 200)])
@@ -90,6 +90,16 @@ def test_how_far_off_schlick_is() -> None:
     off = np.abs(f_schlick(f0_conductor(eta, k), c) - f_conductor(eta, k, c)).max(axis=0)
     assert off[0] == pytest.approx(0.036, abs=5e-4)
     assert off[1:].max() == pytest.approx(0.23, abs=5e-3)
+
+
+@pytest.mark.parametrize("model", ["metal", "beckmann"])
+def test_how_far_off_schlick_is_within_the_usual_ranges(model: str) -> None:
+    """The figure is that in the descriptions of the option `fresnel`."""
+    ranges = [BRDFS[model].parameters()[name].usual for name in ("eta", "k")]
+    eta, k = (values.reshape(-1) for values in np.meshgrid(*(np.linspace(*usual, 60) for usual in ranges)))
+    c = np.linspace(0, 1, 201)
+    off = np.abs(f_schlick(f0_conductor(eta, k), c) - f_conductor(eta, k, c)).max()
+    assert off == pytest.approx(0.255, abs=5e-4)
 
 
 CALLS = {

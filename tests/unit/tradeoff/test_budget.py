@@ -17,9 +17,9 @@ from glshade.cli._options import Duration
 from glshade.image.metrics import METRICS, errors
 from glshade.tradeoff import budget
 from glshade.tradeoff.budget import choose, within_deadline
-from glshade.tradeoff.choice import BudgetError, Choice, applied, parse
+from glshade.tradeoff.choice import BudgetError, Choice, applied, parse, simplest
 from glshade.tradeoff.front import Timing
-from glshade.tradeoff.setting import EXACT, Setting
+from glshade.tradeoff.setting import EXACT, Setting, drawn_from
 from glshade.tradeoff.views import views_around
 from glshade.verification.candidates import surfaces
 
@@ -84,6 +84,31 @@ def test_objects_are_chosen_for_one_by_one(renderer: Renderer) -> None:
     assert measured.by_group([(gouraud, timing)], {"max_abs": (hero + far) / 2}) == [EXACT, gouraud]
     assert measured.by_group([(gouraud, timing)], {"max_abs": hero * 1.01}) == [gouraud, gouraud]
     assert measured.by_group([(gouraud, timing)], {"max_abs": far / 2}) == [EXACT, EXACT]
+
+
+def test_values_that_change_nothing_for_an_object_are_left_out() -> None:
+    """Lambert's model has no highlight, no Fresnel term and no power, so these knobs say nothing about the matte ball."""
+    fast = Setting(shading="gouraud", subdivide=1, specular="half_angle", fresnel="schlick", arithmetic="fast")
+    found = simplest(scene(), [fast, fast])
+    assert found == [
+        Setting(shading="gouraud", subdivide=1, specular="half_angle", arithmetic="fast"),
+        Setting(shading="gouraud", subdivide=1),
+    ]
+    assert drawn_from(applied(scene(), found)) == drawn_from(applied(scene(), [fast, fast]))
+    assert simplest(scene(), found) == found
+
+
+def test_the_words_of_a_choice_name_only_what_matters_and_compare_times_by_ratio(renderer: Renderer) -> None:
+    timed = {EXACT: 4e-3, Setting(specular="half_angle"): 2e-3, Setting(shading="gouraud", specular="half_angle"): 3e-3}
+    uniform = [(setting, Timing(t, t, t)) for setting, t in sorted(timed.items(), key=lambda pair: pair[1])]
+    measured = budget._Measurements(scene(), renderer, 2)
+    measured.exact = Timing(4e-3, 4e-3, 4e-3)
+    chosen = simplest(scene(), [Setting(specular="half_angle")] * 2)
+    limits = {"max_abs": 10.0}
+    runner_up = measured.runner_up(chosen, uniform, limits, share=0.5)
+    assert runner_up.startswith("gouraud, half_angle for all takes 1.50 times as long, max_abs ")
+    choice = Choice(tuple(chosen), limits, measured.errors(chosen), 1e-3, 2e-3, 2, runner_up)
+    assert choice.summary(scene()).splitlines()[:2] == ["hero: phong, half_angle", "far: phong"]
 
 
 def test_impossible_budgets_are_errors_that_name_the_least_possible(renderer: Renderer) -> None:

@@ -125,7 +125,7 @@ def test_a_normal_off_by_a_tenth_of_a_degree_does_not_hide(renderer: g.Renderer)
         # A sphere turned by 0.1 degree has nearly the same outline, but other normals.
         turned = item.model_copy(update={"transform": g.Transform(rotate=tuple(angles))})
         picture = renderer.render(scene.model_copy(update={"objects": (turned,)}), dtype="float32").pixels.copy()
-        assert g.verify(scene, picture=picture).verdict == "failed"
+        assert g.verify(scene, picture=picture, renderer=renderer).verdict == "failed"
 
 
 def test_the_reference_explains_itself(expected: Any) -> None:
@@ -229,3 +229,33 @@ def test_reference_picture(glshade: Any, tmp_path: Path) -> None:
     done = glshade("render", scene, "--reference", "-o", output)
     assert done.returncode == 0, done.stderr
     assert np.abs(read(output)[0][..., :3] - reference.render(g.load(scene)).pixels).max() == 0
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"quality": {"normalise": False}}, "quality.normalise = false"),
+        ({"quality": {"arithmetic": "fast"}}, "quality.arithmetic = fast"),
+        ({"quality": {"storage": "rgba16f"}}, "quality.storage = rgba16f"),
+        ({"film": {"samples": 4}}, "film.samples = 4"),
+        ({"film": {"supersample": 2}}, "film.supersample = 2"),
+    ],
+)
+def test_settings_that_are_not_judged_are_named(keys: Any, words: str, renderer: g.Renderer) -> None:
+    scene = ball()
+    document = scene.model_dump(exclude_none=True)
+    for table, values in keys.items():
+        document[table] = {**document[table], **values}
+    verdict = g.verify(g.Scene.model_validate(document), renderer=renderer)
+    assert verdict.verdict == "verified"
+    assert verdict.left_out == (words,)
+    assert words in str(verdict)
+    assert verdict.as_dict()["left_out"] == [words]
+    assert g.verify(scene, renderer=renderer).left_out == ()
+
+
+def test_an_object_s_own_quality_is_not_judged_either(renderer: g.Renderer) -> None:
+    document = ball().model_dump(exclude_none=True)
+    document["objects"][0]["quality"] = {"normalise": False}
+    verdict = g.verify(g.Scene.model_validate(document), renderer=renderer)
+    assert (verdict.verdict, verdict.left_out) == ("verified", ("quality.normalise = false",))
