@@ -45,18 +45,21 @@ KINDS = {
 }
 
 
-# The length of a name that is compared with others, and the number of names that a message lists. A comparison takes time that
-# grows with the product of the two lengths.
-LONGEST_NAME, MOST_NAMES = 100, 100
+# The length of a name that is compared with others, and the number of names that it is compared with. A comparison takes time
+# that grows with the product of the two lengths.
+LONGEST_NAME, COMPARED = 100, 1000
+# The number of names that a message lists.
+MOST_NAMES = 100
 
 
 def nearest(name: object, names: Iterable[str]) -> str:
     """Returns the end of a message: `; did you mean "x"?` where a name is spelled similarly, else the list of names."""
     names = sorted(names)
-    listed = [known for known in names[:MOST_NAMES] if len(known) <= LONGEST_NAME]
-    close = difflib.get_close_matches(name, listed, n=1) if isinstance(name, str) and len(name) <= LONGEST_NAME else []
+    short = [known for known in names[:COMPARED] if len(known) <= LONGEST_NAME]
+    close = difflib.get_close_matches(name, short, n=1) if isinstance(name, str) and len(name) <= LONGEST_NAME else []
     if close:
         return f'; did you mean "{close[0]}"?'
+    listed = short[:MOST_NAMES]
     return "; allowed: " + (", ".join(listed) or "none") + (", ..." if len(listed) < len(names) else "")
 
 

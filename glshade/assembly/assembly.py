@@ -122,11 +122,12 @@ def _pieces(scene: Scene, shading: Rate | None) -> list[_Piece]:
     """
     pieces: list[_Piece] = []
     problems: list[str] = []
-    by_name = {item.name: item for item in scene.objects}
+    # Name of an object -> its transform and the name of its parent. The objects of a long chain share these arrays.
+    placed = {item.name: (item.transform.array(), item.parent) for item in scene.objects}
     load = scene.loader()
     check_counts(scene, load, shading)
     for number, item in enumerate(scene.objects):
-        world = _world(by_name, item)
+        world = _world(placed, item)
         if not _is_in_range(world):
             problems.append(f"objects[{number}].transform: together with the parents' it is too large or too small")
             continue
@@ -257,13 +258,16 @@ def _file_material(part: MeshPart, path: Path) -> Brdf:
         ) from None
 
 
-def _world(by_name: dict[str | None, Object], item: Object) -> Array:
-    """Returns the transform (4, 4) from an object to world space, through all its parents. Its numbers may be infinite or NaN."""
-    world = item.transform.array()
+def _world(placed: dict[str | None, tuple[Array, str | None]], item: Object) -> Array:
+    """Returns the transform (4, 4) from an object to world space, through all its parents. Its numbers may be infinite or NaN.
+
+    placed: name of an object -> its transform to its parent's space, and the name of its parent.
+    """
+    world, parent = item.transform.array(), item.parent
     with np.errstate(all="ignore"):
-        while item.parent is not None:
-            item = by_name[item.parent]
-            world = item.transform.array() @ world
+        while parent is not None:
+            transform, parent = placed[parent]
+            world = transform @ world
     return world
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from glshade.arrays import rounded
 from glshade.assembly.assembly import Assembly
 from glshade.brdfs import Array, Brdf, parameter_values
+from glshade.errors import SceneError
 from glshade.lights import FALLOFFS, Falloff, Light
 from glshade.textures.texture import DirectionMap, Texture
 
@@ -51,6 +52,7 @@ def light_values(light: Light, eye: Array, exposure: float) -> dict[str, NDArray
     pi f cos I, where cos is the cosine between its normal and the light's direction.
     eye: position of the viewer (3,) [scene units].
     exposure: exposure of the film [stops].
+    Errors: SceneError for a value that is too large for float32.
     """
     values = light.uniforms(eye)
     gain = 2.0**exposure * (1.0 if light.omnidirectional else math.pi)
@@ -59,7 +61,11 @@ def light_values(light: Light, eye: Array, exposure: float) -> dict[str, NDArray
         # At the light's own position its strength must stay below 3e38, where float32 ends: infinity times the cosine 0 is NaN.
         strongest = float(np.abs(values["intensity"]).max())
         values["r_min"] = max(values["r_min"], least_distance(strongest, getattr(light, "falloff", "none")))
-    return {name: rounded(value) for name, value in values.items()}
+    result = {name: rounded(value) for name, value in values.items()}
+    for name, value in result.items():
+        if not np.isfinite(value).all():
+            raise SceneError(f"lights: the {name} of {light.name or f'a {light.type} light'} is too large for float32")
+    return result
 
 
 # The strongest light that a light with a falloff may shed on a point, below the largest float32 of 3e38.

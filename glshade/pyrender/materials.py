@@ -15,6 +15,7 @@ from pydantic import ValidationError
 
 from glshade.brdfs import BRDFS, Brdf
 from glshade.errors import SceneError
+from glshade.limits import Limits
 from glshade.mesh.reading import gltf_material
 from glshade.mesh.reading.file import MeshFile
 from glshade.pyrender.textures import picture, rgba
@@ -202,7 +203,8 @@ def _is_transparent(alpha: float, texture: Any, primitive: Any) -> bool:
 
 def _modelled(table: dict[str, Any], header: dict[str, Any], flat: bool, both: bool, notes: list[str]) -> Brdf:
     """Converts a glTF material into glshade's. notes: a list to which the warnings are added. Errors: SceneError."""
-    file = MeshFile(Path(ORIGIN), Path("/"), b"")
+    # The textures are files that textures.picture has written to a temporary folder.
+    file = MeshFile(Path(ORIGIN), Path("/"), b"", limits=Limits(allow_outside=True))
     keys = gltf_material.material(file, header, [], table)
     keys["sides"] = "both" if both else "front"
     # The callers add the prefix again when they give the warnings.

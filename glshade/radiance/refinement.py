@@ -19,6 +19,10 @@ from glshade.scene.scene import Scene
 
 Array = NDArray[Any]
 
+# A triangle of a refined mesh takes about this many times the time and memory of any other, because its light is computed in
+# float64 at many points.
+COSTLIER = 4
+
 
 def refined_assembly(scene: Scene, assembly: Assembly) -> Assembly:
     """Returns the assembly with finer meshes for the instances whose quality asks for refinement. Errors: AssetError.
@@ -26,7 +30,7 @@ def refined_assembly(scene: Scene, assembly: Assembly) -> Assembly:
     Triangles are cut until the interpolated light differs from the light of `evaluate_surface` by less than the tolerance.
     """
 
-    left = scene.limits.max_triangles
+    left = scene.limits.max_triangles // COSTLIER
 
     def refine(instance: Instance) -> Instance:
         nonlocal left

@@ -444,7 +444,7 @@ def _levels(
     """
     assert surface.footprint is not None
     exact = [sampler.level(*surface.footprint) for sampler in draw.pictures]
-    # The driver's level may be larger than the exact one: by up to 1 by the rule "sum", and by another 1 because of differences.
+    # The driver's level may be larger than the exact one: by up to 1 by the rule "sum", and by 1 more because of differences.
     if max(level.max(initial=-np.inf) for level in exact) < (-2 if "sum" in driver.rules else -1):
         return None
     vertices, place = np.unique(draw.triangles[fragments.triangle], return_inverse=True)

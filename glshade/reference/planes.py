@@ -17,10 +17,6 @@ from glshade.reference.slivers import Clipped, slimness
 
 Array = NDArray[Any]
 
-
-# An edge within this distance of a pixel's centre counts as near where the driver's snapped corners are not known [pixels]. The
-# distance is the margin of coverage and two snapping steps for the corners of the edge.
-NEAR = (MARGIN + 2) / SUBPIXELS
 # A triangle whose height is less than this may turn over, because snapping moves each corner by up to one step [pixels].
 FLAT = 4 / SUBPIXELS
 
@@ -50,78 +46,6 @@ def may_turn(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -
             planes = Planes(draw, part, inputs.size, driver)
             result[indices] = planes.thin[planes.place]
     return result
-
-
-def is_sealed(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> NDArray[np.bool_]:
-    """Whether each partial fragment (N,) belongs to a surface that covers its pixel's centre without a gap.
-
-    Two triangles on either side of a shared edge leave no gap there, whichever of them the driver draws. So a fragment is
-    sealed if each edge near its pixel's centre has a sealed fragment of that pixel on its other side. A triangle that snapping
-    may turn over belongs to a surface of either facing: the surface is continuous, however its corners are snapped, so where a
-    triangle is turned over, its neighbours overlap.
-    """
-    sealed = np.zeros(len(fragments), dtype=np.bool_)
-    owners, possible, twins, edges = [], [], [], []
-    count = 0
-    for number, draw in enumerate(inputs.draws):
-        indices = np.flatnonzero(fragments.draw == number)
-        if not len(indices):
-            continue
-        part = fragments.take(indices)
-        planes = Planes(draw, part, inputs.size, driver)
-        thin = planes.thin[planes.place]
-        # The far edge of a thin triangle counts as near, too.
-        reserve = np.where(thin, FLAT, 0.0)
-        distance = NEAR + planes.reach.max(axis=1)
-        near = np.where(
-            (planes.whole[planes.place] & (distance < NEAR + 1 / SUBPIXELS))[:, None],
-            planes.snapped_distance() <= (MARGIN / SUBPIXELS + reserve)[:, None],
-            planes.distance() <= (distance + reserve)[:, None],
-        )
-        # Where a driver clips a triangle, the new edge is also only drawn to within the distance of the picture's border.
-        centre = planes.at[:, :2]
-        border = planes.clipped[planes.place] & (np.minimum(centre, inputs.size - centre) <= distance[:, None]).any(axis=1)
-        vertices, place = np.unique(planes.corners, return_inverse=True)
-        # Vertices at the same position are the same corner, whatever their other attributes are.
-        _, position_id = np.unique(draw.instance.mesh.positions[vertices] + 0.0, axis=0, return_inverse=True)
-        corner = position_id.reshape(-1)[place.reshape(-1, 3)][planes.place]
-        # Each fragment takes part with the facing that it shows, and with the other one if it may be turned over.
-        turned = np.flatnonzero(thin) if draw.instance.back_faces else np.empty(0, dtype=np.intp)
-        which = np.concatenate([np.arange(len(indices)), turned])
-        twin = np.full(len(which), -1)
-        twin[turned], twin[len(indices) :] = count + len(indices) + np.arange(len(turned)), count + turned
-        twins.append(twin)
-        front = np.concatenate([part.front, ~part.front[turned]])
-        owners.append(indices[which])
-        possible.append((near.any(axis=1) & ~border & ~planes.flat)[which])
-        for k in range(3):
-            with_edge = np.flatnonzero(near[which, k])
-            a, b = corner[which[with_edge], (k + 1) % 3], corner[which[with_edge], (k + 2) % 3]
-            pixel = part.pixel[which[with_edge]]
-            # Neighbours of the same facing run along their shared edge in opposite directions.
-            direction = (a < b) == front[with_edge]
-            draws = np.full(len(with_edge), number)
-            edges.append(np.column_stack([count + with_edge, direction, pixel, draws, np.minimum(a, b), np.maximum(a, b)]))
-        count += len(which)
-    if not owners:
-        return sealed
-    table = np.concatenate(edges)
-    holder, direction = table[:, 0], table[:, 1]
-    _, edge = np.unique(table[:, 2:], axis=0, return_inverse=True)
-    edge = edge.reshape(-1)
-    kept, twin = np.concatenate(possible), np.concatenate(twins)
-    # All candidates count as sealed at first. Those with an edge that has no sealed fragment on its other side are removed,
-    # until every remaining one is sealed. A fragment's own twin, which runs along the edge the other way, does not count.
-    while True:
-        current = kept[holder]
-        number_of = np.zeros((int(edge.max(initial=-1)) + 1, 2), dtype=np.intp)
-        np.add.at(number_of, (edge[current], direction[current]), 1)
-        others = number_of[edge, 1 - direction] - ((twin >= 0) & kept[twin])[holder]
-        lonely = current & (others <= 0)
-        if not lonely.any():
-            sealed[np.concatenate(owners)[kept]] = True
-            return sealed
-        kept[holder[lonely]] = False
 
 
 # The largest factor by which needle-like triangles may multiply the range of an attribute. All results are then finite.
@@ -193,24 +117,31 @@ class Planes:
         moved = half * (terms[:, :2] + screen * terms[:, 3:]) / np.abs(self.w)[:, None]
         self.reach = driver.window * U * (max(size) + moved) + driver.snap
         self.z, self.depth_terms = at[..., 2], terms[:, 2:]
+        self._draw_parts(at, rows[..., :2])
+
+    def _draw_parts(self, at: Array, scaled: Array) -> None:
+        """Computes the attributes that say which parts of the triangles are drawn, and how needle-like these are.
+
+        at: the corners (T, 3, 4) in clip space.
+        scaled: x, y of the corners in the picture, times their w (T, 3, 2).
+        """
+        w = at[..., 3]
         code = clip.outside(at)
         behind = (code & clip.DEPTH != 0).any(axis=1)
-        self.clipped = (code != 0).any(axis=1) if driver.clips else behind
+        self.clipped = (code != 0).any(axis=1) if self.driver.clips else behind
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            window = np.where(behind[:, None, None], 0.0, rows[..., :2] / w[..., None])
+            self.window = window = np.where(behind[:, None, None], 0.0, scaled / w[..., None])
             self.depths = np.nan_to_num(np.clip(self.z / w, 0, 1))
-        self.window = window
         self.whole = ~behind & (clip.outside(at, clip.GUARDED) == 0).all(axis=1)
         slim = slimness(window)
-        with np.errstate(divide="ignore"):
-            # The height of a triangle is its longest side divided by its slimness.
-            self.thin = np.sqrt(((np.roll(window, -1, axis=1) - window) ** 2).sum(axis=2).max(axis=1)) <= FLAT * slim
-        self.thin &= ~behind
+        # The height of a triangle is its longest side divided by its slimness.
+        longest = np.linalg.norm(np.roll(window, -1, axis=1) - window, axis=2).max(axis=1)
+        self.thin = ~behind & (longest <= FLAT * slim)
         self.slim = slim[self.place]
         self.drawn = np.concatenate([window, np.ones((*window.shape[:2], 1))], axis=2)
         cut = np.flatnonzero(self.clipped)
         if len(cut):
-            parts = Clipped.of(at[cut], size)
+            parts = Clipped.of(at[cut], self.size)
             corners = parts.window.shape[1]
             self.drawn = self.drawn[:, np.minimum(np.arange(corners), 2)]
             self.drawn[cut, :, :2] = parts.window

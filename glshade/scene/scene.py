@@ -52,6 +52,8 @@ class Scene(Document):
 
     # The limits under which the scene's file was read; a scene that was built in Python has none.
     _limits: Limits = PrivateAttr(UNLIMITED)
+    # The contents of mesh files by their paths; None: the files are read when the scene is drawn.
+    _models: Mapping[Path, Model] | None = PrivateAttr(None)
 
     def model_post_init(self, context: Any) -> None:
         """Stores the limits that the validation context holds under the key "limits"."""
@@ -65,6 +67,11 @@ class Scene(Document):
     def limits(self) -> Limits:
         """The limits of the work that the scene may ask for, and of the files that its mesh files may name."""
         return self._limits
+
+    @property
+    def models(self) -> Mapping[Path, Model] | None:
+        """The contents of the scene's mesh files, by their paths; None where they are read when the scene is drawn."""
+        return self._models
 
     def quality_of(self, item: Object) -> Quality:
         """Returns the quality with which an object is drawn: its own, over the scene's."""
@@ -93,11 +100,22 @@ class Scene(Document):
 
         The mesh files may name other files in their own folders, and in the folders of all files that the scene names.
         """
+        if self._models is not None:
+            return self._models.__getitem__
         named = [item.mesh for item in self.objects if isinstance(item.mesh, Path)]
         if not named:
             return partial(mesh_file.load, limits=self._limits)
         folders = {path.parent for path in (*named, *(picture.texture for _, picture in self.pictures()))}
         return partial(mesh_file.load, limits=self._limits, folders=frozenset(folder.resolve() for folder in folders))
+
+    def with_models(self, models: Mapping[Path, Model]) -> "Scene":
+        """Returns the scene with the contents of its mesh files, which are then no longer read when it is drawn.
+
+        models: path -> contents, of every mesh file that the scene names.
+        """
+        scene = self.model_copy()
+        scene._models = models
+        return scene
 
     @model_validator(mode="before")
     @classmethod

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from glshade.reference.bounds import TINY, Bounds, alphas, fragment_bounds
 from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.inputs import Inputs, prepare
-from glshade.reference.planes import depth_slack, is_sealed, may_turn
+from glshade.reference.planes import depth_slack, may_turn
 from glshade.reference.raster import MARGIN, Fragments, rasterise
+from glshade.reference.sealing import is_sealed
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
 from glshade.verification.judgement import Expected, PixelClass, classify

@@ -12,7 +12,7 @@ from click.testing import CliRunner
 from hypothesis import given
 from hypothesis import strategies as st
 
-from glshade.batch.frames import Sweep, parse, parse_sweep, pictures
+from glshade.batch.frames import Sweep, check_count, parse, parse_sweep, pictures
 from glshade.cli import cli
 from glshade.image.file import read
 from glshade.scene.file import SceneFile
@@ -162,3 +162,18 @@ def test_a_batch(file: SceneFile) -> None:
     assert sorted(run("-f", "2-4", "-o", "f.##.png", "--overwrite").stdout.split()) == ["f.02.png", "f.03.png", "f.04.png"]
     assert run("-f", "2", "-o", "f.##.png").exit_code == 0, "a single picture replaces its file"
     assert np.array_equal(read("f.03.png")[0][..., :3], bright)
+
+
+@pytest.mark.parametrize("name", ["..", ".", "/etc/x", "a/../../b", "..\\x", "../../../x"])
+def test_no_name_leads_out_of_the_folder(name: str) -> None:
+    sweeps = [Sweep("a.b", (name,))]
+    for pattern in ("out/{camera}/x.png", "out/{camera}.png", "out/{b}/x.png", "out/{a.b}.png"):
+        (picture,) = pictures([Path("s.toml")], None, [name], pattern, sweeps)
+        assert Path("out").resolve() in picture.output.resolve().parents
+        assert len(picture.output.parts) == len(Path(pattern).parts)
+
+
+def test_tasks_are_counted_before_they_are_listed() -> None:
+    check_count(2, 0, 10, [Sweep("a", ("1", "2"))], 40)
+    with pytest.raises(ValueError, match="give 120 pictures; 119 are allowed"):
+        check_count(2, 3, 10, [Sweep("a", ("1", "2"))], 119)

@@ -199,6 +199,7 @@ WRONG = {
     "scales that add up": "".join(
         BALL.replace("ball", f"b{k}") + "transform.scale = 1e99\n" + (f'parent = "b{k - 1}"\n' if k else "") for k in range(4)
     ),
+    "a light too strong for float32": BALL + '[[lights]]\ntype = "point"\nposition = [0, 2, 0]\nintensity = 1e60\n',
     "many brackets": "x = " + "[" * 200_000,
     "a key of many parts": "a." * 300_000 + "b = 1\n",
     "an escape character": BALL.replace("ball", "\\u001b[2J"),
