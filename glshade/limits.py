@@ -15,8 +15,6 @@ LARGEST_SCENE = 16 << 20
 LARGEST_SHADER = 1 << 20
 # trimesh reads a mesh file as a whole into memory.
 LARGEST_MESH = 4 << 30
-# A line of a manifest describes one picture. Its longest part is the error message.
-LARGEST_LINE = 1 << 20
 
 # The nesting of lists and tables in a document. The deepest value of the format, a number of a matrix, lies at depth 6.
 DEEPEST_DOCUMENT = 64
@@ -49,8 +47,8 @@ class Limits:
     """
 
     allow_outside: bool = False
-    # The most that 2 GB of memory hold.
-    max_triangles: int = 1 << 22
+    # The most that 2 GB of memory hold if each triangle has vertices of its own.
+    max_triangles: int = 1 << 21
     # A picture of 4K in 16 shifted copies. A float picture of this size takes 1.6 GB.
     max_pixels: int = 1 << 27
     # A texture takes up to 45 bytes a pixel while it is read.

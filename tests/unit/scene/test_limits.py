@@ -47,7 +47,7 @@ def big_png(path: Path, side: int) -> None:
     [
         (
             '[[objects]]\nshape = { type = "plane", segments = 4096 }\n',
-            r"make 33,554,432 triangles; 4,194,304 .*--max-triangles",
+            r"make 33,554,432 triangles; 2,097,152 .*--max-triangles",
         ),
         (BALL + 'shading = "flat"\nquality.subdivide = 8\n', r"make 591,396,864 triangles; .*--max-triangles"),
         ("film.size = [40000, 40000]\n" + BALL, r"film\.size: shades 1,600,000,000 pixels .*--max-pixels"),
