@@ -251,20 +251,20 @@ def _upside_down(patch: pytest.MonkeyPatch) -> None:
 
 
 def _parents_swapped(patch: pytest.MonkeyPatch) -> None:
-    def wrong(by_name: Any, item: Any) -> Any:
-        world = item.transform.array()
-        while item.parent is not None:
-            item = by_name[item.parent]
-            world = world @ item.transform.array()
-        return world
+    def wrong(placed: Any, item: Any) -> Any:
+        matrix, parent = item.transform.array(), item.parent
+        while parent is not None:
+            above, parent = placed[parent]
+            matrix = matrix @ above
+        return matrix
 
     patch.setattr(assembly, "_world", wrong)
 
 
 def _no_grandparents(patch: pytest.MonkeyPatch) -> None:
-    def wrong(by_name: Any, item: Any) -> Any:
+    def wrong(placed: Any, item: Any) -> Any:
         own = item.transform.array()
-        return own if item.parent is None else by_name[item.parent].transform.array() @ own
+        return own if item.parent is None else placed[item.parent][0] @ own
 
     patch.setattr(assembly, "_world", wrong)
 

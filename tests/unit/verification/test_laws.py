@@ -237,11 +237,13 @@ def lights_split(patch: pytest.MonkeyPatch) -> None:
 def parents_flattened(patch: pytest.MonkeyPatch) -> None:
     """Only the last of several parents counts."""
 
-    def world(by_name: Any, item: Any) -> Any:
-        root = item
-        while root.parent is not None:
-            root = by_name[root.parent]
-        return item.transform.array() if root is item else root.transform.array() @ item.transform.array()
+    def world(placed: Any, item: Any) -> Any:
+        own, parent = item.transform.array(), item.parent
+        if parent is None:
+            return own
+        while placed[parent][1] is not None:
+            parent = placed[parent][1]
+        return placed[parent][0] @ own
 
     patch.setattr(assembly, "_world", world)
 
