@@ -9,6 +9,8 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from glshade.problem import Problem
+
 # The length of a line of a message that concerns a scene [characters].
 LONGEST_LINE = 1000
 # Characters that a terminal obeys or that end a line: control characters, line separators, changes of the direction of
@@ -76,9 +78,22 @@ class AssetError(SceneError):
 
 
 class ShaderError(GlshadeError):
-    """The driver or the include resolver refused a shader. Each line of the message reads `file:line:column: message`."""
+    """The driver or the include resolver refused a shader. Each line of the message reads `file:line:column: message`.
+
+    problems: the faults with the lines of text around them, where the driver found them; empty for other errors.
+    """
 
     exit_code = 4
+
+    def __init__(self, message: str, problems: Sequence[Problem] = ()) -> None:
+        self.problems = tuple(problems)
+        super().__init__(message)
+
+
+class NoReference(GlshadeError):
+    """A model has only a GLSL file, so that nothing tells whether its pictures are right."""
+
+    exit_code = 7
 
 
 class ContextError(GlshadeError):

@@ -21,6 +21,8 @@ class Lru(Generic[Key, Value]):
         """limit: the largest sum of the sizes of all values [bytes]. most: optional, the largest number of values."""
         self.limit, self.most, self.spare = limit, most, spare
         self._kept: OrderedDict[Key, tuple[Value, int]] = OrderedDict()
+        # The keys whose values have not been used since the last call of `age`.
+        self._unused: set[Key] = set()
         self.size = 0
 
     def __len__(self) -> int:
@@ -32,6 +34,7 @@ class Lru(Generic[Key, Value]):
         if found is None:
             return None
         self._kept.move_to_end(key)
+        self._unused.discard(key)
         return found[0]
 
     def put(self, key: Key, value: Value, size: int) -> Value:
@@ -54,12 +57,23 @@ class Lru(Generic[Key, Value]):
     def drop(self, key: Key) -> None:
         """Removes a key and its value, if the key has one."""
         found = self._kept.pop(key, None)
+        self._unused.discard(key)
         if found is not None:
             self.size -= found[1]
+
+    def age(self) -> None:
+        """Marks all values as unused. A value that is looked up or stored afterwards counts as used again."""
+        self._unused = set(self._kept)
+
+    def evict_unused(self) -> None:
+        """Evicts the values that have not been used since the last call of `age`."""
+        for key in tuple(self._unused):
+            self.drop(key)
 
     def clear(self) -> None:
         """Removes all values."""
         self._kept.clear()
+        self._unused.clear()
         self.size = 0
 
 

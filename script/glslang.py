@@ -18,12 +18,12 @@ from typing import get_args
 from glshade.assembly.assembly import assemble
 from glshade.brdfs import BRDFS
 from glshade.gl.evaluation import generated
+from glshade.glsl.coverage import every_light, plan_of_model
 from glshade.glsl.generator import generate
-from glshade.glsl.plan import LightGroup, ProgramPlan, Viewer
+from glshade.glsl.plan import ProgramPlan, Use, Viewer
 from glshade.glsl.planner import plan
 from glshade.glsl.shaders import SHIPPED, expand
 from glshade.glsl.source import Code, Source, Stage
-from glshade.lights import FALLOFFS, LIGHTS
 from glshade.scene.file import load
 
 ROOT = Path(__file__).parent.parent
@@ -32,54 +32,24 @@ sys.path.insert(0, str(ROOT / "tests"))
 from support.extremes import at_extremes  # noqa: E402
 
 
-def groups(count: int) -> tuple[LightGroup, ...]:
-    """Groups of `count` lights for every type and falloff, white and coloured. A count of 0 is for lights in a uniform
-    block."""
-    found = []
-    for name, cls in LIGHTS.items():
-        falloffs = tuple(FALLOFFS) if "falloff" in cls.model_fields else ("none",)
-        for falloff, white in itertools.product(() if cls.ignores_normal else falloffs, (False, True) if count else (False,)):
-            found.append(LightGroup(name, falloff, white, count))
-    return tuple(found)
-
-
 def plans() -> Iterator[ProgramPlan]:
     """Plans of every model at every rate with every light, plans with each other feature, and those of the shipped scenes."""
     rates, viewers = ("flat", "gouraud", "phong"), get_args(Viewer)
-    for (name, model), use in itertools.product(BRDFS.items(), ("uniform", "texture")):
-        parameters = tuple((p, use) for p in model.parameters())
-        if use == "texture":
-            parameters = tuple(
-                (p, use if model.is_colour(p) else f"{use}.{'rgba'[i % 4]}") for i, p in enumerate(model.parameters())
-            )
+    uses: tuple[Use, ...] = ("uniform", "texture")
+    for (name, model), use in itertools.product(BRDFS.items(), uses):
+        base = plan_of_model(name, use)
         unused = tuple((p, "unused") for p in model.parameters())
-        textured = parameters[0][0] if use == "texture" else None
-        base = ProgramPlan(
-            rate="phong",
-            brdf=name,
-            slots=tuple(model().slots().items()),
-            parameters=parameters,
-            lights=groups(1),
-            ambient="varying",
-            viewer="perspective",
-            both_sides=False,
-            alpha="opaque",
-            alpha_from=None,
-            vertex_colours=False,
-            normal_map=False,
-            anisotropic=model.anisotropic,
-            encoding="srgb",
-        )
+        textured = base.parameters[0][0] if use == "texture" else None
         yield from (replace(base, slots=tuple(material.slots().items())) for material in at_extremes(name, 48))
         for rate, viewer, both in itertools.product(rates, viewers, (False, True)):
             one = replace(base, rate=rate, viewer=viewer, both_sides=both, encoding="linear")
-            yield from (replace(one, lights=groups(count)) for count in (0, 1, 3))
-            yield replace(one, ambient="constant", lights=groups(1)[:1])
+            yield from (replace(one, lights=every_light(count)) for count in (0, 1, 3))
+            yield replace(one, ambient="constant", lights=every_light(1)[:1])
             yield replace(one, normal_map=True, vertex_colours=True, alpha="mask", alpha_from=textured)
             yield replace(one, vertex_colours=True, alpha="blend", alpha_from=textured)
             yield replace(one, normal_map=True, normal_span=(2, 1))
             if use == "texture":
-                yield replace(one, shared=tuple((p, parameters[0][0]) for p, _ in parameters[1:]))
+                yield replace(one, shared=tuple((p, base.parameters[0][0]) for p, _ in base.parameters[1:]))
             if model.anisotropic:
                 for bumps, turned in itertools.product((False, True), repeat=2):
                     yield replace(one, normal_map=bumps, turned=turned, direction_map=True)

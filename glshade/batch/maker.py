@@ -24,7 +24,7 @@ from glshade.image.image import Image
 from glshade.limits import Limits
 from glshade.scene.file import SceneFile
 from glshade.scene.film import Film
-from glshade.scene.models import Folders, paths, use_models
+from glshade.scene.models import Folders, paths, use_models, use_shader_models
 from glshade.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -55,8 +55,9 @@ class Maker:
         shaders: Folders | None = None,
         models: Folders | None = None,
     ) -> None:
-        """Takes the arguments of Renderer, and the user's own model folders. Errors: SceneError for a model folder."""
+        """Takes the arguments of Renderer. Errors: SceneError and ShaderError for the user's own models."""
         use_models(models)
+        use_shader_models(shaders)
         self.backend, self.device, self.shaders = backend, device, paths(shaders)
         self._renderer: Renderer | None = None
         self._files: OrderedDict[Any, SceneFile] = OrderedDict()

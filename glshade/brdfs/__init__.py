@@ -137,6 +137,8 @@ class Brdf(Document):
     # Four materials that show what the model can do, as parameters that differ from the defaults; docs/brdfs.md draws them from
     # left to right. A model may leave this empty, and the page then varies its first parameter.
     samples: ClassVar[tuple[Mapping[str, Any], ...]] = ()
+    # Whether `brdf_cos` computes the model. A model that has only a GLSL file has no reference to compare its pictures with.
+    has_reference: ClassVar[bool] = True
     # Whether the model's value can depend on the tangent directions.
     anisotropic: ClassVar[bool] = False
 

@@ -27,6 +27,7 @@ def brdf(name: str) -> dict[str, Any]:
     options: a list of dictionaries with the keys name, default, choices and description.
     laws: law -> `promised` and, if the model breaks the law, the reason.
     limits: a list of dictionaries with the keys says, one, other and within.
+    reference: false for a model that has only a GLSL file, so that nothing is known of its laws and limits.
     Errors: KeyError if no model has this name.
     """
     model = BRDFS[name]
@@ -60,6 +61,7 @@ def brdf(name: str) -> dict[str, Any]:
             {"says": limit.says, "one": _material(limit.one), "other": _material(limit.other), "within": limit.within}
             for limit in model.limits()
         ],
+        "reference": model.has_reference,
     }
 
 

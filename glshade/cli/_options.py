@@ -76,13 +76,18 @@ def driver(command: Any) -> Any:
 
 def shaders(command: Any) -> Any:
     """Adds the option --shaders, whose value `shaders` holds the paths of the user's own shader folders."""
+    return _shaders_option(_check_shaders)(command)
+
+
+def _shaders_option(callback: Any) -> Any:
     return click.option(
         "--shaders",
         multiple=True,
         metavar="FOLDER",
-        callback=_check_shaders,
-        help="Folder of GLSL files that replace glshade's files of the same names, such as brdf/phong.glsl. Repeatable.",
-    )(command)
+        callback=callback,
+        help="Folder of GLSL files that replace glshade's files of the same names, such as brdf/phong.glsl, or add "
+        "reflectance models, such as brdf/mine.glsl. Repeatable.",
+    )
 
 
 def _check_shaders(ctx: click.Context, option: click.Parameter, folders: tuple[str, ...]) -> tuple[str, ...]:
@@ -92,8 +97,10 @@ def _check_shaders(ctx: click.Context, option: click.Parameter, folders: tuple[s
     """
     if folders and not ctx.resilient_parsing:
         from glshade.glsl.shaders import current
+        from glshade.scene.models import use_shader_models
 
         current(folders)
+        use_shader_models(folders)
     return folders
 
 
@@ -102,15 +109,24 @@ def models(command: Any) -> Any:
 
     The models are loaded before the other options are read (click's is_eager), because other options may name a model.
     """
+    return _models_option(_use_models)(command)
+
+
+def _models_option(callback: Any) -> Any:
     return click.option(
         "--models",
         multiple=True,
         metavar="FOLDER",
         is_eager=True,
-        callback=_use_models,
-        help="Folder of further reflectance models and lights, each NAME.py with NAME.glsl beside it. "
+        callback=callback,
+        help="Folder of further reflectance models and lights, each NAME.py with NAME.glsl beside it, or NAME.glsl alone. "
         "The Python files are run. Repeatable.",
-    )(command)
+    )
+
+
+def unread_folders(command: Any) -> Any:
+    """Adds the options --shaders and --models for a command that reads the folders itself, and reports their faults."""
+    return _shaders_option(None)(_models_option(None)(command))
 
 
 def _use_models(ctx: click.Context, option: click.Parameter, folders: tuple[str, ...]) -> tuple[str, ...]:

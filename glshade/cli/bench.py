@@ -145,3 +145,31 @@ def brdfs(
     click.echo(f"{measured.threads} threads; nanoseconds {clock} for one evaluation, median and range of {repeat}")
     heads, *rows = table(measured)
     _table.table(heads, rows)
+
+
+@command.command()
+@driver
+@click.option(
+    "--repeat",
+    type=click.IntRange(1, 1000),
+    default=20,
+    show_default=True,
+    help="Number of edits of each kind that are counted.",
+)
+@click.option("--json", "as_json", is_flag=True, help="Prints the results as one JSON object.")
+def live(backend: Any, device: int | None, repeat: int, as_json: bool) -> None:
+    """Measures `glshade dev`: an edit, a movement, and waiting.
+
+    The figures are the time from an edit of one, two and three shader programs to the picture at 512x512, with its steps;
+    the pictures a second while the camera or a slider moves; and the share of a core that a server takes while nothing happens.
+    """
+    from glshade.bench.live import measure_live
+    from glshade.cli import _table
+
+    measured = measure_live(repeat, backend, device)
+    if as_json:
+        _table.as_json(measured.as_dict())
+        return
+    click.echo(measured.driver)
+    heads, *rows = measured.table()
+    _table.table(heads, rows)

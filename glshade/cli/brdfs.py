@@ -36,11 +36,18 @@ def command(names: tuple[str, ...], as_json: bool, models: tuple[str, ...]) -> N
                     model["name"],
                     model["summary"],
                     " ".join(item["name"] for item in [*model["parameters"], *model["options"]]),
-                    ", ".join(law for law, kept in model["laws"].items() if not kept["promised"]) or "-",
+                    _broken(model),
                 )
                 for model in map(listing.brdf, chosen)
             ],
         )
+
+
+def _broken(model: dict[str, Any]) -> str:
+    """Returns the names of the laws that a model breaks, "-" for none, or "no reference" where they are unknown."""
+    if not model["reference"]:
+        return "no reference"
+    return ", ".join(law for law, kept in model["laws"].items() if not kept["promised"]) or "-"
 
 
 def _show(model: dict[str, Any]) -> None:
@@ -77,7 +84,9 @@ def _show(model: dict[str, Any]) -> None:
             [(item["name"], item["default"], ", ".join(item["choices"]), item["description"]) for item in model["options"]],
         )
     click.echo()
-    for law, kept in model["laws"].items():
+    if not model["reference"]:
+        _table.paragraph("none: the model has only a GLSL file, so its pictures and laws cannot be verified", "reference")
+    for law, kept in model["laws"].items() if model["reference"] else ():
         _table.paragraph(
             f"kept: {listing.LAWS[law]}" if kept["promised"] else f"broken: {kept['reason']}",
             law,

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from glshade.gl.linker import Linker
 
 Backend = Literal["auto", "egl", "osmesa", "standalone"]
+# What moderngl raises where OpenGL refuses a call, for modules outside of this room.
+DriverFault: type[Exception] = moderngl.Error
 BACKENDS: tuple[Backend, ...] = ("auto", "egl", "osmesa", "standalone")
 LIBEGL = "libEGL.so.1"
 # OpenGL 3.3, in moderngl's notation.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+from time import perf_counter
 from typing import Any
 
 import moderngl
@@ -11,14 +11,9 @@ from numpy.typing import NDArray
 
 from glshade.errors import ShaderError
 from glshade.gl.context import Context
-from glshade.glsl.source import Source, Stage
-
-# Message formats: Mesa `0:12(5): error: text`, NVIDIA `0(12) : error C1008: text`, and `ERROR: 0:12: text` of Apple, ANGLE and
-# Intel.
-_MESA = re.compile(r"^\s*\d+:(?P<line>\d+)\((?P<column>\d+)\):\s*(?P<message>.*)$")
-_NVIDIA = re.compile(r"^\s*\d+\((?P<line>\d+)\)\s*:\s*(?P<message>.*)$")
-_OTHERS = re.compile(r"^\s*(?P<kind>ERROR|WARNING):\s*\d+:(?P<line>\d+):\s*(?P<message>.*)$")
-_HEADING = re.compile(r"^(vertex|fragment|geometry|compute)[ _]shader|^=+$|^GLSL Compiler failed|^GLSL Linker failed", re.I)
+from glshade.gl.driver_log import problems_of_log
+from glshade.gl.orphans import delete_orphans
+from glshade.glsl.source import Source
 
 # The types of uniforms and attributes by their values in Khronos' registry (gl.xml).
 TYPES = {
@@ -55,27 +50,6 @@ TYPES = {
 }
 
 
-def rewrite(log: str, stage: Stage) -> list[str]:
-    """The messages in a driver's log, each as `file:line:column: message`, without a column if the driver gives none.
-
-    log: the log of the compiler or linker.
-    stage: the stage that the line numbers in the log refer to.
-    """
-    result = []
-    for raw in log.splitlines():
-        for pattern in (_MESA, _NVIDIA, _OTHERS):
-            match = pattern.match(raw)
-            if match:
-                parts = match.groupdict()
-                column = f":{parts['column']}" if "column" in parts else ""
-                result.append(f"{stage.place(int(parts['line']))}{column}: {parts['message']}")
-                break
-        else:
-            if raw.strip() and not _HEADING.match(raw.strip()):
-                result.append(raw.strip())
-    return result
-
-
 class Program:
     """A linked program.
 
@@ -84,6 +58,7 @@ class Program:
     attributes: the names of the active vertex attributes.
     uniforms: the names of the active uniforms.
     blocks: the names of the active uniform blocks.
+    seconds: the time that it took to compile and link it [s].
     """
 
     def __init__(self, context: Context, source: Source, varyings: tuple[str, ...] = ()) -> None:
@@ -94,6 +69,7 @@ class Program:
         varyings: the outputs of the vertex stage that transform feedback captures.
         Errors: ShaderError with the driver's messages.
         """
+        start = perf_counter()
         try:
             fragment = source.fragment.text if source.fragment else None
             if context.linker and not varyings:
@@ -101,7 +77,10 @@ class Program:
             else:
                 self.gl = context.gl.program(source.vertex.text, fragment, varyings=varyings)
         except moderngl.Error as error:
-            raise ShaderError("\n".join(_explain(str(error), source))) from None
+            delete_orphans(context)
+            problems = problems_of_log(str(error), source)
+            raise ShaderError("\n".join(map(str, problems)), problems) from None
+        self.seconds = perf_counter() - start
         self.members: dict[str, Any] = {name: self.gl[name] for name in self.gl}
         self.attributes = tuple(name for name, member in self.members.items() if isinstance(member, moderngl.Attribute))
         self.uniforms = tuple(name for name, member in self.members.items() if isinstance(member, moderngl.Uniform))
@@ -141,10 +120,3 @@ def _type(member: Any) -> str:
     """The GLSL type of a uniform or an attribute; its number in hexadecimal digits if TYPES does not have it."""
     name = TYPES.get(member.gl_type, f"{member.gl_type:#06x}")
     return f"{name}[{member.array_length}]" if member.array_length > 1 else name
-
-
-def _explain(message: str, source: Source) -> list[str]:
-    """The lines of a moderngl error, rewritten. Its heading, `vertex_shader` or `fragment_shader`, tells the stage."""
-    in_fragment = source.fragment and re.search(r"fragment[_ ]shader", message)
-    lines = rewrite(message, source.fragment if source.fragment and in_fragment else source.vertex)
-    return lines or [message]

@@ -46,6 +46,9 @@ class Renderer:
     context: the OpenGL context.
     resources: the cached programs, meshes, textures and frames.
     rewrite: optional; a function that is applied to every program's Source before it is compiled.
+    shaders: optional; the shader files to draw with, as they were when they were read. Default: the files on disk, as they are
+        when a picture is drawn.
+    last_prepared: the scene of the last picture, made ready to draw; None before the first picture.
     """
 
     def __init__(
@@ -67,6 +70,8 @@ class Renderer:
         """
         use_models(models)
         self.rewrite: Rewrite | None = None
+        self.shaders: Shaders | None = None
+        self.last_prepared: Prepared | None = None
         self._folders = paths(shaders)
         current(self._folders)
         self.context: Context = open_context(backend, device)
@@ -191,11 +196,31 @@ class Renderer:
         self.context.check_open()
         key = (id(scene), shading, encoding, part, self.rewrite)
         prepared = self._prepared.get(key)
-        if prepared is None or prepared.scene is not scene or not prepared.is_current():
+        if prepared is None or prepared.scene is not scene or not self._is_current(prepared):
             assembly = ready(scene, shading, part)
-            prepared = self._preparer.prepare(scene, assembly, encoding, current(self._folders), self.rewrite)
+            prepared = self._preparer.prepare(scene, assembly, encoding, self._shaders(), self.rewrite)
             self._prepared.put(key, prepared, prepared.size)
         return prepared
+
+    def age(self) -> None:
+        """Marks everything that is cached as unused. Whatever later pictures need counts as used again."""
+        self.resources.age()
+        self._prepared.age()
+
+    def evict_unused(self) -> None:
+        """Frees everything that is cached and that no picture has needed since the last call of `age`."""
+        self._prepared.evict_unused()
+        self.resources.evict_unused()
+        with self.context.gl:
+            self.context.gl.gc()
+
+    def _shaders(self) -> Shaders:
+        """The shader files to draw with. Errors: ShaderError."""
+        return current(self._folders) if self.shaders is None else self.shaders
+
+    def _is_current(self, prepared: Prepared) -> bool:
+        """Whether a prepared scene has the shader files to draw with."""
+        return prepared.is_current() if self.shaders is None else prepared.shaders is self.shaders
 
     def draw(self, prepared: Prepared, clip: NDArray[np.float32], calls: Iterable[DrawCall] | None = None) -> None:
         """Draws into the bound framebuffer. The context must be current.
@@ -252,6 +277,7 @@ class Renderer:
         if direct and (prepared.blends or any(call.added for call in prepared.calls)):
             direct = False
             prepared = self.prepare(scene, shading, "linear")
+        self.last_prepared = prepared
         left, top, width, height = film.window
         on_gpu = dtype == "uint8" and len(sample_offsets) == 1 and transform is None
         pixels = self.resources.pixels((height, width, 4), np.uint8 if on_gpu else np.float32)
@@ -345,7 +371,7 @@ class Renderer:
         texture = frame.resolve()
         picture = self.resources.frame(frame.size, "rgba8", 1)
         source = encoder(encoding, shaders)
-        if not shaders.is_current(source.files):
+        if self.shaders is None and not shaders.is_current(source.files):
             source = encoder(encoding, current(self._folders))
         program = self.resources.program(source)
         picture.target.scissor = frame.part  # type: ignore[assignment]

@@ -44,13 +44,13 @@ class Resources:
     def __init__(self, context: Context) -> None:
         self.context = context
         self.vertices = Vertices(context)
-        self._programs: Lru[tuple[Source, bool], Program] = Lru(PROGRAMS)
+        self._programs: Lru[tuple[tuple[str, ...], bool], Program] = Lru(PROGRAMS)
         self._textures: Lru[tuple[Texels, int], moderngl.Texture] = Lru(TEXTURES)
         self._frames: Lru[tuple[tuple[int, int], Storage, int], Frame] = Lru(FRAMES, spare=FRAMES_IN_USE)
         self._pixels: list[NDArray[Any]] = []
 
     def program(self, source: Source, flat: bool = False) -> Program:
-        """The compiled program of a source.
+        """The compiled program of a source. Sources that differ only in comments share one program.
 
         source: the text of the program.
         flat: whether the fragment stage gets flat inputs in place of uniforms; the pictures are the same.
@@ -61,7 +61,21 @@ class Resources:
             written = with_flat_inputs(source, self.context.passed_vectors) if flat else source
             return Program(self.context, written)
 
-        return self._programs.find((source, flat), make, lambda _: PROGRAM)
+        return self._programs.find((source.code, flat), make, lambda _: PROGRAM)
+
+    def age(self) -> None:
+        """Marks all programs, textures and frames as unused. Those that later pictures need count as used again."""
+        for cache in self._caches:
+            cache.age()
+
+    def evict_unused(self) -> None:
+        """Evicts the programs, textures and frames that no picture has needed since the last call of `age`."""
+        for cache in self._caches:
+            cache.evict_unused()
+
+    @property
+    def _caches(self) -> tuple[Lru[Any, Any], ...]:
+        return self._programs, self._textures, self._frames
 
     def texture(self, texels: Texels) -> moderngl.Texture:
         """The texture of a picture file, loaded again if the file has changed. Errors: AssetError."""

@@ -1,7 +1,7 @@
 """Definitions: the functions, structs and constants of a stage's text, and which of them main() reaches.
 
-The module reads only GLSL that clang-format has formatted: each definition starts in the first column of a line, and so does
-the brace that closes it.
+A definition is recognised where it starts in the first column of a line, and where its last line holds nothing else. Any other
+text, such as one with a syntax error, counts as used, so that the driver sees all of it and reports its errors.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import Literal
 _HEAD = re.compile(
     r"(?:const \w+ (?P<const>\w+) =)|(?:struct (?P<struct>\w+) \{)|(?:(?!layout\b)\w+ (?P<function>\w+)\((?P<rest>.*))"
 )
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _CALL = re.compile(r"\b(\w+)\(")
 _WORD = re.compile(r"[A-Za-z_]\w*")
 
@@ -39,31 +40,46 @@ class Definition:
 
 
 def uncommented(text: str) -> str:
-    """The text without its `//` comments."""
-    return re.sub(r"//.*", "", text)
+    """The text without its comments. It keeps its lines."""
+    return _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n"), text)
 
 
 def find_definitions(lines: Sequence[str]) -> list[Definition]:
     """The definitions in a text, in their order."""
     definitions: list[Definition] = []
+    code = uncommented("\n".join(lines)).split("\n")
     at = 0
     while at < len(lines):
-        head = _HEAD.match(lines[at])
-        if head is None:
+        head = _HEAD.match(code[at])
+        end = _end(code, at) if head else None
+        if head is None or end is None:
             at += 1
             continue
         kind: Literal["function", "struct", "const"]
         kind = "const" if head["const"] else "struct" if head["struct"] else "function"
-        is_last = (lambda line: ";" in line) if kind == "const" else (lambda line: line.startswith("}"))
-        end = next((i for i in range(at, len(lines)) if is_last(uncommented(lines[i]))), len(lines) - 1)
         first = at
         while first > 0 and lines[first - 1].startswith("//"):
             first -= 1
-        code = uncommented("\n".join(lines[at : end + 1]))
-        arguments = _arguments(code, code.index("(")) if kind == "function" else 0
-        definitions.append(Definition(kind, head[kind], arguments, first, end + 1, code))
-        at = end + 1
+        text = "\n".join(code[at:end])
+        arguments = _arguments(text, text.index("(")) if kind == "function" else 0
+        definitions.append(Definition(kind, head[kind], arguments, first, end, text))
+        at = end
     return definitions
+
+
+def _end(code: Sequence[str], at: int) -> int | None:
+    """The index after the last line of the definition that starts at a line; None if it does not end cleanly.
+
+    code: the lines of a text without comments.
+    """
+    depth = 0
+    for index in range(at, len(code)):
+        for place, character in enumerate(code[index]):
+            depth += (character in "({") - (character in ")}")
+            if depth == 0 and character in ";}":
+                rest = code[index][place + 1 :].strip(" ;\t")
+                return None if rest else index + 1
+    return None
 
 
 def unreached(lines: Sequence[str]) -> list[Definition]:

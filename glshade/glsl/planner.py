@@ -36,7 +36,9 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
     reached = [assembly.lights[i] for i in instance.lights]
     seen = with_equals(material, material.asked("ambient"))
     varies = (instance.vertex_colours and base in seen) or any(isinstance(getattr(material, name), Texture) for name in seen)
-    answers_to_ambient = varies or ambient_reflectance(material).any()
+    # The colour of ambient light cannot be computed on the CPU for a model that has only a GLSL file.
+    varies |= bool(seen) and not material.has_reference
+    answers_to_ambient = varies or (material.has_reference and ambient_reflectance(material).any())
     # Without textures and vertex colours, ambient light adds one colour, which is computed on the CPU.
     ambient: Literal["none", "constant", "varying"] = "none"
     if answers_to_ambient and any(light.ignores_normal for light in reached):

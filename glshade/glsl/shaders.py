@@ -20,7 +20,7 @@ from glshade.errors import ShaderError
 from glshade.files import read_bytes
 from glshade.glsl.source import Code, Declaration, Include, Stage, Storage
 from glshade.limits import LARGEST_SHADER
-from glshade.scene.models import model_folders
+from glshade.scene.models import model_folders, use_shader_models
 
 _PACKAGE = Path(__file__).parent.parent
 # A wheel holds the shaders inside the package; a checkout holds them beside it.
@@ -31,7 +31,7 @@ FAST = "fast"
 # The folders to which a user's own model or light may add a file, NAME.glsl beside NAME.py.
 OF_MODELS = ("brdf", "light")
 
-_INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*$')
+_INCLUDE = re.compile(r'^\s*#include\s+(?:"([^"]+)"|<([^>]+)>)\s*(?://.*)?$')
 # The declaration of a global variable in a shader file. clang-format leaves one declaration per line.
 _VARIABLE = re.compile(
     r"^(?:layout\(.*?\) )?(?:invariant )?(?P<qualifier>flat |centroid |noperspective |smooth )?"
@@ -102,13 +102,21 @@ class Shaders:
 
         name: for example "math/unit.glsl".
         fast: whether to prefer the fast form.
-        Errors: ShaderError for a file that cannot be read as text.
+        Errors: ShaderError for a file that cannot be read as text, and for a symbolic link that leads out of the user's folder.
         """
         if (name, fast) not in self._files:
-            self._files[name, fast] = found = next(filter(None, map(_read, self._candidates(name, fast))), None)
+            found = next(filter(None, map(_read, self._candidates(name, fast))), None)
             if found is not None:
+                self._check_inside(found.path)
                 self._stamps[str(found.path)] = found.stamp
+            self._files[name, fast] = found
         return self._files[name, fast]
+
+    def _check_inside(self, path: Path) -> None:
+        """Checks that a file of a user's folder does not lie outside that folder. Errors: ShaderError."""
+        folder = next((folder for folder in (*self.own, *self.models) if path.is_relative_to(folder)), None)
+        if folder is not None and not path.resolve().is_relative_to(folder.resolve()):
+            raise ShaderError(f"{path}: is a symbolic link that leads out of {folder}, so it is not read")
 
     def _candidates(self, name: str, fast: bool) -> Iterator[Path]:
         """The paths where a file may lie, in the order of preference."""
@@ -124,6 +132,14 @@ class Shaders:
         if fast:
             yield SHIPPED / FAST / name
         yield SHIPPED / name
+
+    def read_own(self) -> None:
+        """Reads all files of the user's folders, so that later changes of these files do not show. Errors: ShaderError."""
+        names = {name for folder in self.own for name in _names(folder)}
+        names |= {f"{part}/{path.name}" for folder in self.models for path in folder.glob("*.glsl") for part in OF_MODELS}
+        for name in sorted(names):
+            self.find(name)
+            self.find(name, fast=True)
 
     @property
     def names(self) -> list[str]:
@@ -150,12 +166,14 @@ _current: dict[tuple[Path, ...], Shaders] = {}
 def current(folders: Iterable[str | Path] = ()) -> Shaders:
     """The shader files of folders as they are now; the same object as in the last call if nothing has changed.
 
+    Files brdf/NAME.glsl that replace no shipped file become reflectance models.
     folders: the user's shader folders, which come before the shipped one.
     Errors: ShaderError.
     """
     key = tuple(Path(os.path.abspath(folder)) for folder in folders)
     known = _current.get(key)
     if known is None or not known.is_current():
+        use_shader_models(key)
         known = _current[key] = Shaders(key)
     return known
 
@@ -181,10 +199,13 @@ class _Expansion:
         self._text: list[str] = []
         self._lines: list[tuple[str, int]] = []
         self._declared: list[tuple[int, Declaration]] = []
+        self._faults: list[str] = []
 
     def stage(self, name: str) -> Stage:
-        """The stage whose text starts with the file `name`."""
+        """The stage whose text starts with the file `name`. Errors: ShaderError with every include that cannot be resolved."""
         self._include(name, name)
+        if self._faults:
+            raise ShaderError("\n".join(self._faults))
         return Stage("\n".join(self._text) + "\n", tuple(self._lines), tuple(self._declared))
 
     def _include(self, name: str, asked_from: str) -> None:
@@ -193,7 +214,8 @@ class _Expansion:
         self._seen.add(name)
         file = self._shaders.find(name, self._fast)
         if file is None:
-            raise ShaderError(f'{asked_from}: no shader file "{name}"{nearest(name, self._shaders.names)}')
+            self._faults.append(f'{asked_from}: no shader file "{name}"{nearest(name, self._shaders.names)}')
+            return
         self._written(str(file.path), file.lines)
 
     def _fill(self, place: str, asked_from: str) -> None:
@@ -203,7 +225,8 @@ class _Expansion:
             return
         self._seen.add(name)
         if place not in self._generated:
-            raise ShaderError(f"{asked_from}: nothing is generated for {name}{nearest(place, self._generated)}")
+            self._faults.append(f"{asked_from}: nothing is generated for {name}{nearest(place, self._generated)}")
+            return
         code = self._generated[place]
         if isinstance(code, str):
             self._written(name, code.splitlines())
@@ -218,12 +241,24 @@ class _Expansion:
         """Adds the text of a file: its includes are resolved, and its declarations are recognised."""
         for number, line in enumerate(lines, 1):
             include = _INCLUDE.match(line)
-            if include is None:
+            if include is None and "#include" in line:
+                self._no_include(line, file, number)
+            elif include is None:
                 self._add(line, file, number, _declaration(line))
             elif include[1] is not None:
                 self._include(include[1], f"{file}:{number}")
             else:
                 self._fill(include[2], f"{file}:{number}")
+
+    def _no_include(self, line: str, file: str, number: int) -> None:
+        """Adds a line in which #include stands in a comment; any other line is a fault.
+
+        moderngl looks for #include anywhere in a text, so the comment is added without its sign.
+        """
+        code, slashes, comment = line.partition("//")
+        if "#include" in code:
+            self._faults.append(f'{file}:{number}: is no valid include; an include is #include "FILE" or #include <PLACE>')
+        self._add(f"{code}{slashes}{comment.replace('#include', 'include')}", file, number, None)
 
     def _add(self, line: str, file: str, number: int, declaration: Declaration | None) -> None:
         if declaration is not None:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Literal, TypeAlias
 
 Storage = Literal["uniform", "block", "in", "out"]
+_COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 
 
 @dataclass(frozen=True)
@@ -151,10 +153,21 @@ class Source:
         return (self.vertex,) if self.fragment is None else (self.vertex, self.fragment)
 
     @cached_property
+    def code(self) -> tuple[str, ...]:
+        """The texts of the stages without comments, indentation and empty lines. Equal code makes equal programs."""
+        return tuple(_without_comments(stage.text) for stage in self.stages)
+
+    @cached_property
     def files(self) -> frozenset[str]:
         """The paths of the shader files that the lines came from."""
         named = {file for stage in self.stages for file, _ in stage.lines}
         return frozenset(file for file in named if not file.startswith("<"))
+
+
+def _without_comments(text: str) -> str:
+    """GLSL without comments, indentation and empty lines."""
+    lines = map(str.strip, _COMMENT.sub(" ", text).splitlines())
+    return "\n".join(line for line in lines if line)
 
 
 # A function that is applied to every source before it is compiled.

@@ -99,12 +99,11 @@ def probe(path: str | Path) -> None:
 
 
 def pixel_count(path: str | Path) -> int:
-    """Returns the number of pixels of a picture, from its file's header. Errors: AssetError."""
+    """Returns the number of pixels of a picture, from its file's header, with up to four channels each. Errors: AssetError."""
     try:
-        width, height = _format_to_read(path).size(Path(path))
+        return _format_to_read(path).pixel_count(Path(path))
     except OSError as error:
         raise _unreadable(path, error) from None
-    return width * height
 
 
 def _format_to_read(path: str | Path) -> PictureFormat:

@@ -106,26 +106,34 @@ class Image:
         """
         path = Path(path)
         floats = format_of(path).floats
-        image = self.linear() if floats else self.encoded()
-        if floats and image is not self:
+        if floats and self.linear() is not self:
             warnings.warn(
                 f"{path}: an 8-bit image is saved as float; render with dtype='float32' for all its digits",
                 stacklevel=2,
             )
-        contents = PictureContents(
-            image.pixels,
-            encoding="linear" if floats else image.encoding,
-            premultiplied=floats,
-            attributes={**image.attributes, **(attributes or {})},
-            corner=image.corner,
-            whole=image.whole,
-        )
-        write(path, contents)
+        write(path, self._contents(floats, attributes or {}))
 
-    def _repr_png_(self) -> bytes:
+    def png(self) -> bytes:
+        """Returns the bytes of the PNG file that `save` writes. Errors: OSError."""
         import tempfile
 
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "image.png"
-            self.save(path)
+            # The format writes the file itself: `write` would wait until it has reached the disk.
+            format_of(path).write(path, self._contents(False, {}))
             return path.read_bytes()
+
+    def _contents(self, floats: bool, attributes: Mapping[str, str]) -> PictureContents:
+        """Returns the contents of a picture file. floats: whether it holds float32 numbers. attributes: further texts."""
+        image = self.linear() if floats else self.encoded()
+        return PictureContents(
+            image.pixels,
+            encoding="linear" if floats else image.encoding,
+            premultiplied=floats,
+            attributes={**image.attributes, **attributes},
+            corner=image.corner,
+            whole=image.whole,
+        )
+
+    def _repr_png_(self) -> bytes:
+        return self.png()

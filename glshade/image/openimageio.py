@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 from collections.abc import Mapping
@@ -78,15 +79,15 @@ def read(path: Path) -> PictureContents:
     )
 
 
-def size(path: Path) -> tuple[int, int]:
-    """Returns the width and height of a picture from its file's header [pixels].
+def pixel_count(path: Path) -> int:
+    """Returns the number of pixels of a picture from its file's header. More than four channels count as further pixels.
 
     Errors: OSError, with the reason as its text.
     """
     source = _opened(path)
     spec = source.spec()
     source.close()
-    return spec.width, spec.height
+    return int(spec.width * spec.height * spec.depth * max(1, math.ceil(spec.nchannels / 4)))
 
 
 def attributes(path: Path) -> dict[str, str]:

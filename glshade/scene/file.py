@@ -21,7 +21,7 @@ from glshade.limits import DEFAULT, LARGEST_SCENE, MOST_FAULTS, Limits
 from glshade.mesh import file as mesh_file
 from glshade.mesh.model import Model
 from glshade.scene import checking
-from glshade.scene.models import Folders, use_models
+from glshade.scene.models import Folders, use_models, use_shader_models
 from glshade.scene.scene import Scene
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ def load(
     overrides: Overrides = (),
     *,
     models: Folders | None = None,
+    shaders: Folders | None = None,
     allow_outside: bool = False,
     limits: Limits = DEFAULT,
 ) -> Scene:
@@ -47,12 +48,15 @@ def load(
     overrides: values that replace those of the file, in their order: a table of dotted keys such as "materials.body.roughness"
         or "objects.ball.shading"; or pairs of key and text, as in `--set KEY=VALUE`.
     models: a folder, or several, with reflectance models and lights of the user's own.
+    shaders: a shader folder, or several, whose files brdf/NAME.glsl may be reflectance models.
     allow_outside: whether mesh files may name textures, materials and buffers outside their folder and the folders that the
         scene names. docs/security.md explains it.
     limits: the largest numbers of triangles and pixels.
-    Errors: SceneError with every fault, each with the file, the key path and the values that are allowed.
+    Errors: SceneError with every fault, each with the file, the key path and the values that are allowed; ShaderError for a
+    reflectance model whose GLSL struct cannot be understood.
     """
     use_models(models)
+    use_shader_models(shaders)
     limits = replace(limits, allow_outside=limits.allow_outside or allow_outside)
     return SceneFile(path, overrides, limits).scene()
 
@@ -138,7 +142,7 @@ class SceneFile:
             document = at_frame(self.document, written.animation, frame)
         except OverrideError as error:
             raise SceneError(f"{self.path}: animation: {error}") from None
-        return parse(_merged(written, self.document, document), self.path, self.limits)
+        return parse(merged(written, self.document, document), self.path, self.limits)
 
     def _through(self, camera: str, scene: Scene) -> Scene:
         """Returns the scene with one of its further cameras; the same object for the same scene."""
@@ -176,14 +180,16 @@ class SceneFile:
         self._checked = scene
 
 
-def _merged(written: Scene, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
+def merged(written: Scene, before: Mapping[str, Any], after: Mapping[str, Any]) -> dict[str, Any]:
     """Returns the table `after`, with validated values in place of those that it shares with the table `before`.
 
     written: the scene that was validated from `before`.
     """
     merged: dict[str, Any] = {}
     for key, value in after.items():
-        known, old = getattr(written, key), before.get(key)
+        # An override may add a key that no scene has; it is refused later.
+        known: Any = getattr(written, key, None)
+        old = before.get(key)
         if value is old:
             merged[key] = known
         elif isinstance(value, list) and isinstance(old, list):

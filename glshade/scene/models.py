@@ -1,4 +1,7 @@
-"""Models: the reflectance models and lights that users add in folders of their own, as files NAME.py and NAME.glsl."""
+"""Models: the reflectance models and lights that users add in folders of their own, as files NAME.py and NAME.glsl.
+
+A reflectance model may also be a file NAME.glsl alone, in such a folder or as brdf/NAME.glsl in a shader folder.
+"""
 
 from __future__ import annotations
 
@@ -6,26 +9,33 @@ import hashlib
 import importlib.util
 import os
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from glshade.brdfs import BRDFS, Brdf
-from glshade.errors import SceneError
+from glshade.errors import SceneError, ShaderError
 from glshade.files import check_regular, read_bytes
 from glshade.lights import LIGHTS, Light
 from glshade.limits import LARGEST_SHADER
+from glshade.scene.glsl_model import read_model
 
 # The package name that modules from the users' folders have in sys.modules.
 PACKAGE = "glshade_models"
+
+# A module can be looked up by its name only if its package can, which pickle does.
+sys.modules.setdefault(PACKAGE, ModuleType(PACKAGE))
 
 # One folder, or several.
 Folders = str | Path | Iterable[str | Path]
 
 # The folders whose models this process knows -> the digest of each folder's Python files at the time when they were run.
 _folders: dict[Path, str] = {}
+# The GLSL files without a Python file beside them that may define a model -> (the text that was read last, whether it defines
+# one).
+_alone: dict[Path, tuple[bytes, bool]] = {}
 
 
 def model_folders() -> tuple[Path, ...]:
@@ -43,9 +53,10 @@ def use_models(folders: Folders | None) -> None:
 
     NAME.py defines a class: a Brdf with the file's name in capitals (`shiny_thing.py`: ShinyThing), or a Light whose class name
     also ends in "Light" (`lamp.py`: LampLight). NAME.glsl beside it is its GLSL. Files whose names start with _ are not models;
-    the models may import them. A folder that is known already is skipped.
+    the models may import them. A NAME.glsl without a NAME.py is a reflectance model without a reference. A folder that is known
+    already is skipped, except for such files: those that have changed are read again.
     Errors: SceneError for a folder without models, a file that cannot be run, a class or a GLSL file that is missing, or a
-    name that is taken.
+    name that is taken; ShaderError for a GLSL file alone whose struct cannot be understood.
     """
     for folder in paths(folders):
         if folder not in _folders:
@@ -56,7 +67,64 @@ def use_models(folders: Folders | None) -> None:
                     BRDFS.add(name, model)
                 else:
                     LIGHTS.add(name, model)
-            _folders[folder] = _digest(folder)
+            _folders[folder] = files_digest(folder)
+    beside = [path for folder in _folders for path in sorted(folder.glob("*.glsl")) if not path.with_suffix(".py").exists()]
+    _read_alone(dict.fromkeys([*beside, *(path for path in _alone if path.exists())]))
+
+
+def use_shader_models(folders: Folders | None) -> None:
+    """Adds the reflectance models that are files brdf/NAME.glsl of shader folders. Files that replace other models add none.
+
+    Errors: ShaderError for a file whose struct cannot be understood.
+    """
+    for folder in paths(folders):
+        _read_alone(sorted((folder / "brdf").glob("*.glsl")))
+
+
+def _read_alone(files: Iterable[Path]) -> None:
+    """Adds or replaces the models of GLSL files that have no Python file, where their text has changed.
+
+    Errors: ShaderError with the faults of all files.
+    """
+    faults: list[str] = []
+    for path in files:
+        known = _alone.get(path)
+        if path.stem.startswith("_") or (path.stem in BRDFS and not (known and known[1])):
+            continue
+        try:
+            _add_alone(path, read_bytes(path, LARGEST_SHADER))
+        except OSError as error:
+            faults.append(f"{path}: cannot be read: {error.strerror}")
+        except ShaderError as error:
+            faults.append(str(error))
+    if faults:
+        raise ShaderError("\n".join(faults))
+
+
+def _add_alone(path: Path, text: bytes) -> None:
+    """Adds or replaces the model of a GLSL file, unless its text is known. Errors: ShaderError."""
+    if path not in _alone or _alone[path][0] != text:
+        model = read_model(path, text)
+        _alone[path] = text, model is not None
+        if model is not None:
+            BRDFS.add(path.stem, model)
+
+
+def glsl_models() -> dict[Path, bytes]:
+    """Returns the files of all models without a reference that this process knows, each with its text."""
+    return {path: text for path, (text, is_model) in _alone.items() if is_model}
+
+
+def use_glsl_models(texts: Mapping[Path, bytes]) -> None:
+    """Adds models without a reference, or replaces them, by their texts. Errors: ShaderError. texts: file -> its text."""
+    for path, text in texts.items():
+        _add_alone(path, text)
+
+
+def are_stale(folders: Folders | None) -> bool:
+    """Returns whether this process runs other models than these folders hold now. Only a new process can run changed files."""
+    wanted = paths(folders)
+    return any(folder not in wanted or files_digest(folder) != digest for folder, digest in _folders.items())
 
 
 def paths(folders: Folders | None) -> tuple[Path, ...]:
@@ -77,12 +145,12 @@ def _files(folder: Path) -> list[Path]:
         except OSError as error:
             raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
     files = sorted(path for path in folder.glob("*.py") if not path.stem.startswith("_"))
-    if not files:
-        raise SceneError(f"{folder}: has no models: a model is NAME.py with NAME.glsl beside it")
+    if not files and not any(folder.glob("*.glsl")):
+        raise SceneError(f"{folder}: has no models: a model is NAME.py with NAME.glsl beside it, or NAME.glsl alone")
     return files
 
 
-def _digest(folder: Path) -> str:
+def files_digest(folder: Path) -> str:
     """Returns the SHA-256 of a folder's Python files, those that start with _ included."""
     digest = hashlib.sha256()
     for path in sorted(folder.glob("*.py")):

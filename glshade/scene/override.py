@@ -81,13 +81,17 @@ def apply(document: Mapping[str, Any], key: str, value: Any) -> dict[str, Any]:
     quotes: `materials."v1.2".kd`. A missing table is added; a missing material with a preset's name is added as that preset.
     Errors: OverrideError.
     """
+    result = _put(document, parts_of(key), (), value)
+    assert isinstance(result, dict)
+    return result
+
+
+def parts_of(key: str) -> tuple[str, ...]:
+    """Returns the parts of a dotted key, without quotes and brackets. Errors: OverrideError."""
     if not KEY.fullmatch(key):
         raise OverrideError(f"{key!r} is not a dotted key such as materials.body.roughness")
     written = map(str.strip, re.findall(f"{PART}|{ITEM}", key))
-    parts = tuple(part[1:-1] if part[0] in "\"'[" else part for part in written)
-    result = _put(document, parts, (), value)
-    assert isinstance(result, dict)
-    return result
+    return tuple(part[1:-1] if part[0] in "\"'[" else part for part in written)
 
 
 def _put(node: Any, parts: tuple[str, ...], before: tuple[str, ...], value: Any) -> Any:
@@ -103,20 +107,20 @@ def _put(node: Any, parts: tuple[str, ...], before: tuple[str, ...], value: Any)
     part, rest = parts[0], parts[1:]
     path = (*before, part)
     if isinstance(node, list | tuple):
-        index = _index(node, path)
+        index = index_of(node, path)
         return [_put(item, rest, path, value) if i == index else item for i, item in enumerate(node)]
     if node is None:
         if len(before) == 1 and before[0] in LISTS:
-            raise OverrideError(f"{_key(path)}: the scene lists no {before[0]}")
+            raise OverrideError(f"{dotted(path)}: the scene lists no {before[0]}")
         node = {}
     if isinstance(node, str):
         node = _unfolded(node, path)
     if not isinstance(node, Mapping):
-        raise OverrideError(f"{_key(path)}: {_key(before)} is {shortened(node)}, not a table")
+        raise OverrideError(f"{dotted(path)}: {dotted(before)} is {shortened(node)}, not a table")
     below = node.get(part)
     if below is None and rest and before == ("materials",):
         if part not in PRESETS:
-            raise OverrideError(f'{_key(path)}: no material or preset is named "{part}"{nearest(part, {*node, *PRESETS})}')
+            raise OverrideError(f'{dotted(path)}: no material or preset is named "{part}"{nearest(part, {*node, *PRESETS})}')
         below = {"preset": part}
     return {**node, part: _put(below, rest, path, value)}
 
@@ -132,28 +136,28 @@ def _unfolded(word: str, path: tuple[str, ...]) -> dict[str, Any]:
     if before[-1] == "shape":
         return {"type": word}
     if before[-1] == "material":
-        instead = _key(("materials", word, part))
-        raise OverrideError(f'{_key(path)}: the material is named "{word}"; set {instead} in its place')
-    raise OverrideError(f"{_key(path)}: {_key(before)} is {shortened(word)}, not a table")
+        instead = dotted(("materials", word, part))
+        raise OverrideError(f'{dotted(path)}: the material is named "{word}"; set {instead} in its place')
+    raise OverrideError(f"{dotted(path)}: {dotted(before)} is {shortened(word)}, not a table")
 
 
-def _index(items: list[Any] | tuple[Any, ...], path: tuple[str, ...]) -> int:
+def index_of(items: list[Any] | tuple[Any, ...], path: tuple[str, ...]) -> int:
     """Returns the index of the item that the last part of the path names or numbers. Errors: OverrideError."""
     part = path[-1]
     names = [item.get("name") if isinstance(item, Mapping) else None for item in items]
     if part in names:
         return names.index(part)
     if not items:
-        raise OverrideError(f"{_key(path)}: {_key(path[:-1])} is empty")
+        raise OverrideError(f"{dotted(path)}: {dotted(path[:-1])} is empty")
     if not re.fullmatch("[0-9]+", part):
         known = [name for name in names if isinstance(name, str)]
-        raise OverrideError(f'{_key(path)}: no item is named "{part}"{nearest(part, [*known, f"0 to {len(items) - 1}"])}')
+        raise OverrideError(f'{dotted(path)}: no item is named "{part}"{nearest(part, [*known, f"0 to {len(items) - 1}"])}')
     # The length is compared first, because int() refuses a text of several thousand digits.
     if len(part) > len(str(len(items))) or int(part) >= len(items):
-        raise OverrideError(f"{_key(path)}: the list has {len(items)} items, numbered from 0")
+        raise OverrideError(f"{dotted(path)}: the list has {len(items)} items, numbered from 0")
     return int(part)
 
 
-def _key(parts: Iterable[str]) -> str:
+def dotted(parts: Iterable[str]) -> str:
     """Returns the dotted key of its parts, with quotes where a part needs them."""
     return ".".join(part if re.fullmatch(BARE, part) else f'"{part}"' for part in parts)

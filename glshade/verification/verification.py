@@ -46,7 +46,8 @@ def verify(
     driver: optional; the errors of the driver's fixed functions. By default they are measured. If only `picture` is given, its
         driver is not known, and may use the whole freedom that the specification leaves it.
     shaders, models: folders of the user's own shaders and models, as for Renderer.
-    Errors: SceneError, ShaderError, ContextError, GlshadeError where `picture` has another size than the scene's.
+    Errors: SceneError, ShaderError, ContextError; NoReference for a reflectance model that has only a GLSL file; GlshadeError
+    where `picture` has another size than the scene's.
     """
     from time import perf_counter
 

@@ -129,6 +129,7 @@ def write_models(folder: Path) -> Path:
 def forget_models(patch: pytest.MonkeyPatch) -> None:
     """Makes the process forget all model folders. Models that it adds later are removed when the patch ends."""
     patch.setattr(models, "_folders", {})
+    patch.setattr(models, "_alone", {})
     for found in (BRDFS, LIGHTS):
         patch.setattr(found, "_names", list(found._names))
         patch.setattr(found, "_classes", dict(found._classes))

@@ -18,10 +18,10 @@ PACKAGE = ROOT / "glshade"
 # A room imports from the rooms before it.
 ROOMS = (
     *("optics", "image", "lights", "presets", "textures", "mesh", "brdfs", "scene", "assembly", "radiance", "glsl", "gl"),
-    *("reference", "driver", "verification", "catalogue", "pyrender", "tradeoff", "batch", "bench", "cli"),
+    *("reference", "driver", "verification", "catalogue", "pyrender", "tradeoff", "live", "batch", "bench", "cli"),
 )
 # Modules of no room, which every room may import. They import no room.
-BASE = {"errors", "found", "document", "files", "limits", "arrays", "version", "lru"}
+BASE = {"errors", "found", "document", "files", "limits", "arrays", "version", "lru", "problem"}
 # `python -m glshade` runs the command line.
 ENTRIES = {"", "__main__"}
 # docs/tradeoff.md names glshade.tradeoff.study.study, and what is documented keeps its name.

@@ -26,7 +26,7 @@ FIXED_TIME = "1970:01:01 00:00:00"
 class PictureFormat:
     """A picture format. A subclass states where its format differs from these defaults.
 
-    OpenImageIO writes and reads the files. A format that it does not know overrides write, read, size and attributes.
+    OpenImageIO writes and reads the files. A format that it does not know overrides write, read, pixel_count and attributes.
 
     floats: True where files hold float32 numbers, linear and not clipped; False where they hold 8-bit numbers.
     alpha: True where files hold alpha; False where only the colours are written.
@@ -62,14 +62,14 @@ class PictureFormat:
 
         return openimageio.read(path)
 
-    def size(self, path: Path) -> tuple[int, int]:
-        """Returns the width and height of the picture in a file [pixels], without reading its pixels.
+    def pixel_count(self, path: Path) -> int:
+        """Returns the number of pixels of the picture in a file, without reading them. Four channels count as one pixel.
 
         Errors: OSError, with the reason as its text.
         """
         from glshade.image import openimageio
 
-        return openimageio.size(path)
+        return openimageio.pixel_count(path)
 
     def attributes(self, path: Path) -> dict[str, str]:
         """Returns the texts about the picture in a file, by name. Errors: OSError for a file of another format."""

@@ -74,7 +74,9 @@ class TestBrdfs:
                     assert BRDFS[limit[key]["brdf"]](**limit[key]) == getattr(declared_limit, key)
 
     def test_keys_are_an_interface(self) -> None:
-        keys = "name class summary description source anisotropic parameters options laws shares isotropic_where limits"
+        keys = (
+            "name class summary description source anisotropic parameters options laws shares isotropic_where limits reference"
+        )
         assert list(listing.brdf("phong")) == keys.split()
         assert {"name", "type", "default", "low", "high", "usual", "unit", "description", "same_as", "base"} <= set(
             listing.brdf("phong")["parameters"][0]

@@ -117,6 +117,26 @@ def test_verify(run: Run) -> None:
     assert run("verify", "plain.toml", "--shaders", "own").code == 6
 
 
+def test_a_model_without_a_python_file(run: Run) -> None:
+    glsl = CHALK_GLSL.replace("Chalk", "Slate")
+    above = '"directional", direction = [0, -1, 0]'
+    write(Path(), "slate.toml", SCENE.replace('"chalk"', '"slate"').replace('"zenith"', above))
+    for option, folder, name in (("--shaders", "own", "own/brdf/slate.glsl"), ("--models", "models", "models/slate.glsl")):
+        path = write(Path(), name, glsl)
+        # Worker processes know the model, too.
+        sweep = ("--sweep", "lights.0.intensity=1,0.5", "-o", "{intensity}.exr", "--jobs", "2", "--overwrite")
+        assert run("render", "slate.toml", *sweep, option, folder).code == 0
+        assert value("1.exr") == pytest.approx(VALUE, rel=1e-3)
+        for command in (("verify",), ("render", "--reference", "-o", "x.exr")):
+            done = run(*command, "slate.toml", option, folder)
+            assert done.code == 7
+            assert 'slate.glsl: the model "slate" has no reference' in done.err
+        path.unlink()
+    write(Path(), "models/slate.glsl", glsl)
+    assert re.search(r"^slate .* no reference$", run("brdfs", "--models", "models").out, flags=re.MULTILINE)
+    assert "reference: none" in run("brdfs", "slate", "--models", "models").out
+
+
 def test_explain(run: Run) -> None:
     assert "chalk per pixel" in (said := run("explain", "s.toml", "--source", "--models", "models").out)
     assert "NoL * NoL" in said

@@ -121,7 +121,7 @@ def test_programs_die(limited: Callable[..., Renderer]) -> None:
         stage = source.fragment
         assert stage is not None
         return replace(
-            source, fragment=replace(stage, text=f"{stage.text}// {number}\n", lines=(*stage.lines, ("this test", 1)))
+            source, fragment=replace(stage, text=f"{stage.text}#define N {number}\n", lines=(*stage.lines, ("this test", 1)))
         )
 
     for number in range(COUNT // 4):

@@ -10,7 +10,8 @@ import pytest
 
 from glshade import Renderer, ShaderError
 from glshade.gl.context import Context
-from glshade.gl.program import TYPES, Program, rewrite
+from glshade.gl.driver_log import messages, problem
+from glshade.gl.program import TYPES, Program
 from glshade.glsl.source import Source, Stage
 
 STAGE = Stage("a\nb\nc\nd\n", (("x.glsl", 1), ("y.glsl", 7), ("y.glsl", 8), ("<surface>", 3)))
@@ -24,7 +25,7 @@ STAGE = Stage("a\nb\nc\nd\n", (("x.glsl", 1), ("y.glsl", 7), ("y.glsl", 8), ("<s
         ('0(3) : error C1503: undefined variable "foo"', ['y.glsl:8: error C1503: undefined variable "foo"']),
         ("0(3) : warning C7050: might be used", ["y.glsl:8: warning C7050: might be used"]),
         ("ERROR: 0:1: Use of undeclared identifier 'foo'", ["x.glsl:1: Use of undeclared identifier 'foo'"]),
-        ("WARNING: 0:2: extension is not supported", ["y.glsl:7: extension is not supported"]),
+        ("WARNING: 0:2: extension is not supported", ["y.glsl:7: warning: extension is not supported"]),
         (
             "0:99(1): error: syntax error, unexpected end of file",
             ["<surface>:3:1: error: syntax error, unexpected end of file"],
@@ -38,7 +39,7 @@ STAGE = Stage("a\nb\nc\nd\n", (("x.glsl", 1), ("y.glsl", 7), ("y.glsl", 8), ("<s
     ],
 )
 def test_messages(log: str, expected: list[str]) -> None:
-    assert rewrite(log, STAGE) == expected
+    assert [str(problem(message, STAGE, "fragment")) for message in messages(log)] == expected
 
 
 def stage(text: str, name: str) -> Stage:

@@ -142,7 +142,7 @@ def _write(name: str, text: str) -> Fault:
     ("fault", "file", "says"),
     [
         (shutil.rmtree, "", "is not a folder"),
-        (lambda folder: [file.unlink() for file in folder.glob("*.py")], "", "has no models"),
+        (lambda folder: [file.unlink() for file in folder.glob("*.*")], "", "has no models"),
         (_write("zenith.py", "class ZenithLight(:\n"), "zenith.py", "SyntaxError"),
         (_write("zenith.py", "import no_such_module\n"), "zenith.py", "ModuleNotFoundError"),
         (_write("zenith.py", "raise ValueError('one\\ntwo')\n"), "zenith.py", "ValueError: one two"),

@@ -1,0 +1,246 @@
+"""Judge: the process that compares a view with the float64 reference. It has a low priority, so that drawing comes first.
+
+It starts from the drawer's snapshot, and draws the view itself with the same driver.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from glshade.driver.freedom import measure_freedom
+from glshade.errors import NoReference, SceneError
+from glshade.gl.renderer import Renderer
+from glshade.image.image import Image
+from glshade.image.view import displayed
+from glshade.live.child import serve
+from glshade.live.faults import FAULTS, tables
+from glshade.live.messages import (
+    Answer,
+    Failed,
+    Frame,
+    Heat,
+    Judged,
+    Loaded,
+    Probe,
+    Probed,
+    Reference,
+    Request,
+    Restore,
+    Verify,
+    View,
+)
+from glshade.live.snapshot import restored
+from glshade.live.views import Views
+from glshade.reference.picture import render
+from glshade.scene.scene import Scene
+from glshade.verification.candidates import Candidates, find_candidates, left_out, single_sample
+from glshade.verification.judgement import PixelClass
+from glshade.verification.report import CLASS_MEANING, RAMP, heat
+from glshade.verification.verdict import Verdict, verdict_of
+
+Array = NDArray[Any]
+# The number of unexplained pixels that are listed.
+LISTED = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A view that was judged.
+
+    scene: its scene, with one sample a pixel.
+    expected: the values that its pixels may have.
+    verdict: the result.
+    left_out: the settings of the view that were not judged.
+    """
+
+    scene: Scene
+    expected: Candidates
+    verdict: Verdict
+    left_out: tuple[str, ...]
+
+
+class Judge:
+    """Judges views of one revision."""
+
+    def __init__(self, backend: str, device: str, folder: str) -> None:
+        """Does not open a context yet. The arguments are those of the drawer."""
+        self._backend: Any = backend
+        self._device = int(device) if device else None
+        self._opened: Renderer | None = None
+        self._views: Views | None = None
+        # The last view that was judged, because a probe or a heat map of the same view often follows.
+        self._last: tuple[Scene, str | None, Trial] | None = None
+
+    @property
+    def renderer(self) -> Renderer:
+        """The renderer, which opens the context at first use. Errors: ContextError."""
+        if self._opened is None:
+            self._opened = Renderer(self._backend, self._device)
+        return self._opened
+
+    def answer(self, request: Request) -> Answer:
+        """Returns the answer to a request."""
+        handlers: dict[type[Request], Callable[[Any], Answer]] = {
+            Restore: self._restore,
+            Verify: self._verify,
+            Probe: self._probe,
+            Reference: self._reference,
+            Heat: self._heat,
+        }
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                return handlers[type(request)](request)
+            except FAULTS as error:
+                return Failed(id=request.id, problems=tables(error))
+
+    def answered(self) -> None:
+        """Has nothing left to do after an answer."""
+
+    def idle(self) -> None:
+        """Has nothing to do while it waits."""
+
+    def _restore(self, request: Restore) -> Answer:
+        revision = restored(Path(request.folder))
+        self._views, self._last = Views(revision), None
+        return Loaded(id=request.id, revision=revision.number, shown=revision.number, snapshot=request.folder)
+
+    def _verify(self, request: Verify) -> Answer:
+        start = perf_counter()
+        try:
+            trial = self._trial(request.view)
+        except NoReference as error:
+            return Judged(id=request.id, verdict="none", text=str(error), revision=self._number)
+        verdict = trial.verdict
+        rows, columns = np.nonzero(verdict.comparison.excess > 0)
+        ambiguous = sum(number for kind, number in verdict.comparison.counts.items() if kind.ambiguous)
+        return Judged(
+            id=request.id,
+            verdict=verdict.verdict,
+            text=_sentence(trial),
+            unexplained=verdict.unexplained,
+            ambiguous=ambiguous,
+            pixels=[(int(x), int(y)) for x, y in zip(columns[:LISTED], rows[:LISTED], strict=True)],
+            revision=self._number,
+            seconds=perf_counter() - start,
+        )
+
+    def _probe(self, request: Probe) -> Answer:
+        trial = self._trial(request.view)
+        width, height = trial.expected.expected.size
+        if not (0 <= request.x < width and 0 <= request.y < height):
+            raise SceneError(f"the pixel {request.x}, {request.y} lies outside the picture, which is {width} x {height}")
+        pixel = request.y * width + request.x
+        value = trial.verdict.picture[request.y, request.x]
+        expected, comparison = trial.expected.expected, trial.verdict.comparison
+        nearest = int(comparison.candidate[pixel])
+        low, high, centre = (
+            (part[nearest] if nearest >= 0 else expected.background)[: len(value)]
+            for part in (expected.low, expected.high, expected.centre)
+        )
+        base = int(trial.expected.base[nearest]) if nearest >= 0 else -1
+        fragments = trial.expected.fragments
+        kind = PixelClass(int(trial.verdict.classes[request.y, request.x]))
+        explained = comparison.excess[request.y, request.x] <= 0
+        return Probed(
+            id=request.id,
+            x=request.x,
+            y=request.y,
+            value=_numbers(value),
+            reference=_numbers(centre),
+            low=_numbers(low),
+            high=_numbers(high),
+            kind=kind.name.lower(),
+            object=trial.expected.inputs.draws[int(fragments.draw[base])].instance.name if base >= 0 else None,
+            triangle=int(fragments.triangle[base]) if base >= 0 else None,
+            text=f"{'explained' if explained else 'not explained'}: {CLASS_MEANING[kind]}",
+            revision=self._number,
+        )
+
+    def _reference(self, request: Reference) -> Answer:
+        start = perf_counter()
+        scene, shading = self._scene(request.view)
+        film = scene.film
+        image = render(scene, shading=shading)
+        shown = displayed(image, film.encoding, ocio=film.ocio, display=film.display, view=film.view)
+        return self._frame(request, shown, start)
+
+    def _heat(self, request: Heat) -> Answer:
+        start = perf_counter()
+        colours, low, high = heat(self._trial(request.view).verdict.comparison.error)
+        scale = {
+            "low": low,
+            "high": high,
+            "text": "difference from the reference, linear light, on a logarithmic scale",
+            "colours": ["#" + "".join(f"{int(code):02x}" for code in colour) for colour in RAMP],
+        }
+        return self._frame(request, Image(colours, "srgb"), start, scale)
+
+    def _frame(self, request: Request, image: Image, start: float, scale: dict[str, Any] | None = None) -> Frame:
+        height, width, _ = image.shape
+        drawn = perf_counter()
+        data = image.png()
+        times = {"draw": 1000 * (drawn - start), "encode": 1000 * (perf_counter() - drawn)}
+        return Frame(
+            id=request.id,
+            data=data,
+            width=width,
+            height=height,
+            revision=self._number,
+            milliseconds=times,
+            scale=scale,
+        )
+
+    @property
+    def _number(self) -> int:
+        """The number of the revision that is judged; 0 where there is none."""
+        return self._views.revision.number if self._views else 0
+
+    def _scene(self, view: View) -> tuple[Scene, Any]:
+        """Returns the scene of a view and the rate that replaces those of its objects. Errors: SceneError."""
+        if self._views is None:
+            raise SceneError("there is no picture yet")
+        return self._views.shown({**view, "layer": None}).scene, view.get("shading")
+
+    def _trial(self, view: View) -> Trial:
+        """Returns the result for a view, from memory if it is the last one. Errors: NoReference, SceneError, ShaderError."""
+        scene, shading = self._scene(view)
+        if self._last is None or self._last[0] is not scene or self._last[1] != shading:
+            self._last = scene, shading, self._judged(scene, shading)
+        return self._last[2]
+
+    def _judged(self, scene: Scene, shading: Any) -> Trial:
+        """Draws a scene and compares it with the reference."""
+        assert self._views is not None
+        self._views.revision.draw_with(self.renderer)
+        single = single_sample(scene)
+        # The reference comes first: a model without one is refused before anything is drawn.
+        expected = find_candidates(single, shading=shading, driver=measure_freedom(self.renderer.context))
+        picture = self.renderer.render(single, dtype="float32", shading=shading).pixels.copy()
+        return Trial(single, expected, verdict_of(picture, expected, explain=False), left_out(scene))
+
+
+def _sentence(trial: Trial) -> str:
+    """Returns a verdict as one sentence."""
+    verdict = trial.verdict
+    if verdict.verdict == "verified":
+        text = f"verified: all pixels agree with the float64 reference, {verdict.ambiguous:.1%} of them are ambiguous"
+    else:
+        text = f"{verdict.verdict}: {'; '.join(verdict.reasons)}"
+    return f"{text}; not judged: {', '.join(trial.left_out)}" if trial.left_out else text
+
+
+def _numbers(values: Array) -> list[float]:
+    return [float(value) for value in values]
+
+
+if __name__ == "__main__":
+    serve(Judge)
