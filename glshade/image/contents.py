@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -31,3 +31,27 @@ class PictureContents:
     attributes: Mapping[str, str] = field(default_factory=dict)
     corner: tuple[int, int] = (0, 0)
     whole: tuple[int, int] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """One part of a picture file, as its header describes it. Most files have one part; OpenEXR and TIFF may have several.
+
+    name: the part's name; empty where the file gives none.
+    channels: the names of the C channels, such as R or normal.X.
+    size: width, height of the stored pixels [pixels].
+    corner: x, y of their top left corner in the whole picture [pixels].
+    whole: width, height of the whole picture [pixels].
+    orientation: Exif's number, from 1 to 8, of the turn or mirroring with which the picture is meant to be shown; 1 is none.
+    floats: True where the part holds floats, False where it holds 8-bit codes.
+    read: returns the pixels, (H, W, C) uint8 or float32, row 0 at the top. Errors: OSError, with the reason as its text.
+    """
+
+    name: str
+    channels: tuple[str, ...]
+    size: tuple[int, int]
+    corner: tuple[int, int]
+    whole: tuple[int, int]
+    orientation: int
+    floats: bool
+    read: Callable[[], NDArray[Any]]

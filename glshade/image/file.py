@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Literal
 
 from glshade.errors import AssetError, GlshadeError
 from glshade.files import replacing
-from glshade.image.contents import PictureContents
+from glshade.image.contents import Part, PictureContents
 from glshade.image.formats import FORMATS, PictureFormat
 
 if TYPE_CHECKING:
@@ -78,6 +78,22 @@ def read(path: str | Path, encoding: Literal["auto", "srgb", "linear"] = "auto")
     if has_alpha and contents.premultiplied:
         colour = np.divide(colour, alpha, out=colour.copy(), where=alpha > 0)
     return np.concatenate([colour[..., :3], alpha], axis=2), has_alpha
+
+
+def parts(path: str | Path) -> list[Part]:
+    """Returns the parts of a picture file, from their headers. Errors: AssetError, also for a part that `read_part` refuses."""
+    try:
+        return _format_to_read(path).parts(Path(path))
+    except OSError as error:
+        raise _unreadable(path, error) from None
+
+
+def read_part(path: str | Path, part: Part) -> NDArray[np.uint8] | NDArray[np.float32]:
+    """Returns the pixels of one of the file's parts as they are stored, (H, W, C). Errors: AssetError."""
+    try:
+        return part.read()
+    except OSError as error:
+        raise _unreadable(path, error) from None
 
 
 def attributes(path: str | Path) -> dict[str, str]:

@@ -6,6 +6,7 @@ import math
 import os
 import shutil
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ import OpenImageIO as oiio
 from numpy.typing import NDArray
 
 from glshade.files import check_regular
-from glshade.image.contents import PictureContents
+from glshade.image.contents import Part, PictureContents
 
 # Linux's folder with a path for each open file of this process, through which libraries can write to a file in memory.
 OPEN_FILES = "/proc/self/fd"
@@ -63,9 +64,7 @@ def read(path: Path) -> PictureContents:
 
     Integers count as sRGB-encoded, floats as linear. Errors: OSError, with the reason as its text.
     """
-    keep_straight_alpha = oiio.ImageSpec()
-    keep_straight_alpha.attribute("oiio:UnassociatedAlpha", 1)
-    source = _opened(path, keep_straight_alpha)
+    source = _opened(path, _keep_straight_alpha())
     spec = source.spec()
     pixels = source.read_image(oiio.FLOAT)
     message = _one_line(source.geterror())
@@ -77,6 +76,68 @@ def read(path: Path) -> PictureContents:
         encoding="linear" if str(spec.format) in {"float", "half", "double"} else "srgb",
         premultiplied=not spec.get_int_attribute("oiio:UnassociatedAlpha"),
     )
+
+
+def parts(path: Path) -> list[Part]:
+    """Returns the parts of a picture file from their headers, without reading their pixels.
+
+    Errors: OSError, with the reason as its text, also where a part holds anything but 8-bit codes or floats, is CMYK, a volume
+    or deep, or has no pixels.
+    """
+    source = _opened(path, _keep_straight_alpha())
+    found: list[Part] = []
+    try:
+        while source.seek_subimage(len(found), 0):
+            found.append(_part(path, len(found), source.spec()))
+        # Some formats leave a message when there is no further part. It must be fetched, or it would go to stderr.
+        message = _one_line(source.geterror())
+    finally:
+        source.close()
+    if not found:
+        raise OSError(message or "has no parts")
+    return found
+
+
+def _part(path: Path, index: int, spec: oiio.ImageSpec) -> Part:
+    """Returns one part of a file from its header. Errors: OSError where `parts` refuses it."""
+    kind = str(spec.format)
+    if kind not in {"uint8", "float", "half"}:
+        raise OSError(f"holds numbers of the type {kind}; only 8-bit integers, float and half are compared")
+    if any(item.name.endswith(":ColorSpace") and item.value in {"CMYK", "YCCK"} for item in spec.extra_attribs):
+        raise OSError("is CMYK; only grey and RGB pictures are compared")
+    if spec.deep or spec.depth > 1:
+        raise OSError("is deep or a volume; only flat pictures are compared")
+    if spec.width < 1 or spec.height < 1 or spec.nchannels < 1:
+        raise OSError("has no pixels")
+    return Part(
+        name=spec.get_string_attribute("oiio:subimagename"),
+        channels=tuple(spec.channelnames),
+        size=(spec.width, spec.height),
+        corner=(spec.x - spec.full_x, spec.y - spec.full_y),
+        whole=(spec.full_width, spec.full_height),
+        orientation=spec.get_int_attribute("Orientation", 1),
+        floats=kind != "uint8",
+        read=partial(_read_part, path, index, oiio.UINT8 if kind == "uint8" else oiio.FLOAT),
+    )
+
+
+def _read_part(path: Path, index: int, kind: Any) -> NDArray[Any]:
+    """Returns the pixels of a part, (H, W, C), as numbers of OpenImageIO's type `kind`. Errors: OSError."""
+    source = _opened(path, _keep_straight_alpha())
+    spec = source.spec(index, 0)
+    pixels = source.read_image(index, 0, 0, spec.nchannels, kind)
+    message = _one_line(source.geterror())
+    source.close()
+    if pixels is None or message:
+        raise OSError(message or "no pixels")
+    return np.asarray(pixels).reshape(spec.height, spec.width, spec.nchannels)
+
+
+def _keep_straight_alpha() -> oiio.ImageSpec:
+    """Returns the settings of a file that is opened for reading: colours are not multiplied by alpha."""
+    settings = oiio.ImageSpec()
+    settings.attribute("oiio:UnassociatedAlpha", 1)
+    return settings
 
 
 def pixel_count(path: Path) -> int:
@@ -104,6 +165,10 @@ def attributes(path: Path) -> dict[str, str]:
 def _opened(path: Path, *config: oiio.ImageSpec) -> Any:
     """Returns the file, opened for reading. Errors: OSError."""
     check_regular(path)
+    try:
+        str(path).encode()
+    except UnicodeEncodeError:
+        raise OSError("its name is not UTF-8, which OpenImageIO requires; rename it") from None
     source = oiio.ImageInput.open(str(path), *config)
     if source is None:
         raise OSError(_one_line(oiio.geterror()))

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, ClassVar, Literal, TypeAlias
 from glshade.found import Found
 
 if TYPE_CHECKING:
-    from glshade.image.contents import PictureContents
+    from glshade.image.contents import Part, PictureContents
 
 Metadata = Literal["attributes", "description", "nowhere"]
 Settings: TypeAlias = Mapping[str, str | int]
@@ -26,7 +26,8 @@ FIXED_TIME = "1970:01:01 00:00:00"
 class PictureFormat:
     """A picture format. A subclass states where its format differs from these defaults.
 
-    OpenImageIO writes and reads the files. A format that it does not know overrides write, read, pixel_count and attributes.
+    OpenImageIO writes and reads the files. A format that it does not know overrides write, read, parts, pixel_count and
+    attributes.
 
     floats: True where files hold float32 numbers, linear and not clipped; False where they hold 8-bit numbers.
     alpha: True where files hold alpha; False where only the colours are written.
@@ -61,6 +62,12 @@ class PictureFormat:
         from glshade.image import openimageio
 
         return openimageio.read(path)
+
+    def parts(self, path: Path) -> list[Part]:
+        """Returns the parts of a file from their headers. Errors: OSError, with the reason as its text."""
+        from glshade.image import openimageio
+
+        return openimageio.parts(path)
 
     def pixel_count(self, path: Path) -> int:
         """Returns the number of pixels of the picture in a file, without reading them. Four channels count as one pixel.
