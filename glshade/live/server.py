@@ -119,6 +119,9 @@ class Listener:
         family = socket.AF_INET6 if ":" in host else socket.AF_INET
         try:
             self.socket = socket.create_server((host, port), family=family)
+            # Nagle's algorithm would hold the picture back for 40 ms, until the browser has acknowledged the state before it.
+            # asyncio switches it off only where a socket names its protocol; connections inherit the option.
+            self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         except (OSError, OverflowError) as error:
             reason = error.strerror if isinstance(error, OSError) else str(error)
             raise GlshadeError(f"{bracketed(host)}:{port}: cannot listen there: {reason}") from None
