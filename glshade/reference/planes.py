@@ -48,6 +48,10 @@ def may_turn(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -
     return result
 
 
+# Beyond this slimness the error of a triangle's slopes counts twice, for the numerator and for the denominator of the quotient.
+# Below it the other terms of the error have room for both. On fans of 1,000 to 30,000 triangles, whose slimness is 100 to
+# 5,000, llvmpipe's errors reach half of the result.
+NEEDLE = 64.0
 # The largest factor by which needle-like triangles may multiply the range of an attribute. All results are then finite.
 LARGEST = 1e6
 
@@ -214,6 +218,6 @@ class Planes:
         span = np.ptp(np.einsum("tcj,tej->tec", planes, self.drawn), axis=1)[self.place]
         over_w = np.ptp(np.einsum("tj,tej->te", self.G.sum(axis=1), self.drawn), axis=1)[self.place]
         # A triangle without an area would have an infinite factor.
-        factor = np.minimum(self.driver.plane * U * self.slim, LARGEST)
+        factor = np.minimum(self.driver.plane * U * (self.slim + np.maximum(self.slim - NEEDLE, 0)), LARGEST)
         result: Array = factor[:, None] * (span + np.abs(value) * over_w[:, None])
         return result

@@ -73,6 +73,20 @@ def test_needles_are_verified(kind: str, rate: Any, renderer: Renderer) -> None:
     assert verdict.verdict == "verified", str(verdict)
 
 
+@pytest.mark.parametrize("rate", ["gouraud", "phong"])
+def test_a_fan_of_needles_has_room_to_spare(rate: Any, renderer: Renderer) -> None:
+    count = 10_000
+    angle = np.arange(count) * 2 * np.pi / count
+    corners = np.concatenate([np.zeros((1, 3)), np.column_stack([np.cos(angle), np.sin(angle), np.full(count, 0.1)])])
+    number = np.arange(count)
+    faces = np.column_stack([np.zeros(count, dtype=np.intp), 1 + number, 1 + (number + 1) % count])
+    disc = {"mesh": (corners, faces), "material": SHINY, "sides": "both"}
+    scene = view("cube").model_dump(exclude_none=True) | {"objects": [disc]}
+    verdict = verify(Scene.model_validate(scene), renderer=renderer, shading=rate)
+    assert verdict.verdict == "verified", str(verdict)
+    assert verdict.used < 0.8
+
+
 def test_an_edge_on_disc_may_show_any_of_its_triangles(renderer: Renderer) -> None:
     """The base of the cone is seen exactly edge-on, so its depth at a pixel has no meaning."""
     scene = Scene.model_validate(
