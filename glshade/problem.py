@@ -41,7 +41,7 @@ class Problem:
         return f"{place}: {self.message}" if place else self.message
 
     def beside(self, lines: Sequence[str]) -> Problem:
-        """The same problem with an excerpt. lines: all lines of the text that the fault lies in."""
+        """Returns the same problem with an excerpt. lines: all lines of the text that the fault lies in."""
         if self.line is None or not 1 <= self.line <= len(lines):
             return self
         first = max(self.line - AROUND, 1)
@@ -60,7 +60,7 @@ class Problem:
         return "\n".join(shown)
 
     def as_dict(self) -> dict[str, Any]:
-        """The problem as JSON types. "caret" is the column again, or null where the excerpt does not reach it."""
+        """Returns the problem as JSON types. "caret" is the column again, or null where the excerpt does not reach it."""
         return {
             "file": self.file,
             "line": self.line,

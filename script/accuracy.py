@@ -82,7 +82,7 @@ within {factor:g} x conditioning.
 
 
 def bounds(name: str) -> float:
-    """The bound that the contract tests check for the model, in units of the conditioning."""
+    """Returns the bound that the contract tests check for the model, in units of the conditioning."""
     sys.path.insert(0, str(ROOT / "tests" / "contracts"))
     from test_extremes_conditioning import EXCEPTIONS
 
@@ -90,7 +90,7 @@ def bounds(name: str) -> float:
 
 
 def page() -> str:
-    """The text of docs/accuracy.md, measured now."""
+    """Returns the text of docs/accuracy.md, measured now."""
     from support.extremes import STRONG
 
     l, v, case = joined(pairs())
@@ -135,7 +135,7 @@ def page() -> str:
 
 
 def parameters(material: Brdf) -> str:
-    """The scalars and options of a material that differ from the defaults, as text; "-" where none does."""
+    """Returns the scalars and options of a material that differ from the defaults, as text; "-" where none does."""
     model = type(material)
     names = [*(name for name in model.parameters() if not model.is_colour(name)), *model.choices()]
     given = {name: getattr(material, name) for name in names}
@@ -144,7 +144,7 @@ def parameters(material: Brdf) -> str:
 
 
 def models(text: str) -> list[list[str]]:
-    """The names of the models that have a row, for each table of the page."""
+    """Returns the names of the models that have a row, for each table of the page."""
     return [re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE) for part in text.split("\n## ")[1:]]
 
 

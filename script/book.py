@@ -82,7 +82,7 @@ def marked(key: str, text: str) -> str:
 
 
 def words(page: str) -> str:
-    """The page without its measured text, for a comparison."""
+    """Returns the page without its measured text, for a comparison."""
     return MARK.sub(r"\1\2", page)
 
 
@@ -93,7 +93,7 @@ def kept(page: str) -> dict[str, str]:
 
 
 def paragraphs(model: type[Brdf]) -> str:
-    """The docstring of a model, with the characters escaped that mean something in Markdown."""
+    """Returns the docstring of a model, with the characters escaped that mean something in Markdown."""
     parts = (inspect.getdoc(model) or "").split("\n\n")
     return "\n\n".join(re.sub(r"([*<])", r"\\\1", " ".join(part.split())) for part in parts) + "\n"
 
@@ -105,14 +105,14 @@ def headline(model: type[Brdf]) -> str:
 
 
 def figure(value: Any) -> str:
-    """A value as a scene file would write it. Three equal numbers become one."""
+    """Returns a value as a scene file would write it. Three equal numbers become one."""
     if isinstance(value, tuple | list):
         return f"{value[0]:g}" if len(set(value)) == 1 else f"[{', '.join(f'{x:g}' for x in value)}]"
     return f"{value:g}" if isinstance(value, float | int) else str(value)
 
 
 def parameters(model: type[Brdf]) -> str:
-    """The table of a model's parameters and options."""
+    """Returns the table of a model's parameters and options."""
     rows = []
     for name, declared in model.parameters().items():
         default = model.model_fields[name].default
@@ -129,7 +129,7 @@ def parameters(model: type[Brdf]) -> str:
 
 
 def laws(model: type[Brdf]) -> str:
-    """The list of the laws that a model keeps or breaks, and of its limits."""
+    """Returns the list of the laws that a model keeps or breaks, and of its limits."""
     breaks = model.breaks
     said = [f"not kept: {breaks['reciprocity']}" if "reciprocity" in breaks else "kept"]
     shares = " + ".join(model.shares)
@@ -144,8 +144,8 @@ def laws(model: type[Brdf]) -> str:
 
 
 def samples(model: type[Brdf]) -> Sequence[Mapping[str, Any]]:
-    """The parameters of the four materials in a model's pictures, from left to right: the model's own samples where it names
-    some, else four values of its first scalar, else four brightnesses of its first colour."""
+    """Returns the parameters of the four materials in a model's pictures, from left to right: the model's own samples where it
+    names some, else four values of its first scalar, else four brightnesses of its first colour."""
     if model.samples:
         return model.samples
     colours = [name for name in model.parameters() if model.is_colour(name)]
@@ -160,12 +160,12 @@ def samples(model: type[Brdf]) -> Sequence[Mapping[str, Any]]:
 
 
 def caption(model: type[Brdf]) -> str:
-    """The words below a model's picture: the parameters of each sample, from left to right."""
+    """Returns the words below a model's picture: the parameters of each sample, from left to right."""
     return "; ".join(", ".join(f"{name} {figure(value)}" for name, value in one.items()) for one in samples(model))
 
 
 def materials(model: type[Brdf]) -> list[Brdf]:
-    """The samples as materials. A kd that a sample does not set is CLAY."""
+    """Returns the samples as materials. A kd that a sample does not set is CLAY."""
     base = {"kd": CLAY} if "kd" in model.parameters() else {}
     return [model.model_validate({"brdf": model.model_fields["brdf"].default, **base, **one}) for one in samples(model)]
 
@@ -228,7 +228,7 @@ def measured(costs: Costs) -> dict[str, str]:
 
 
 def page(costs: Mapping[str, str]) -> str:
-    """The text of docs/brdfs.md. costs: key -> measured text; a missing key leaves its place empty."""
+    """Returns the text of docs/brdfs.md. costs: key -> measured text; a missing key leaves its place empty."""
     text = INTRODUCTION.format(incidence=INCIDENCE, clay=figure(CLAY)) + "\n"
     rows = []
     for name, model in BRDFS.items():
@@ -280,12 +280,12 @@ def pictures() -> None:
 
 
 def _copy(image: Image) -> Image:
-    """A copy of the pixels, because the renderer draws the next picture into the same array."""
+    """Returns a copy of the pixels, because the renderer draws the next picture into the same array."""
     return replace(image, pixels=image.pixels.copy())
 
 
 def faults() -> list[str]:
-    """The faults of the page and its pictures that can be found without measuring; no faults give an empty list."""
+    """Returns the faults of the page and its pictures that can be found without measuring; no faults give an empty list."""
     text = PAGE.read_text(encoding="utf-8") if PAGE.exists() else ""
     figures = kept(text)
     found = [] if words(text) == words(page({})) else ["docs/brdfs.md is not what the models say"]

@@ -82,8 +82,8 @@ def from_spd(folder: Path, symbol: str) -> Spectrum:
 
 
 def reflectance(eta: Array, k: Array, cos: Array) -> Array:
-    """The Fresnel reflectance (...) of unpolarised light from vacuum, by complex amplitudes. cos (...): cosine of the angle of
-    incidence."""
+    """Returns the Fresnel reflectance (...) of unpolarised light from vacuum, by complex amplitudes. cos (...): cosine of the
+    angle of incidence."""
     index = eta + 1j * k
     cos_inside = np.sqrt(1 - (1 - cos * cos) / (index * index))
     across = (cos - index * cos_inside) / (cos + index * cos_inside)
@@ -108,7 +108,7 @@ def rgb_weights(wavelength: Array) -> Array:
 
 
 def colour(spectrum: Spectrum, cos: Array = COS) -> Array:
-    """The metal's reflectance (A, 3) in linear Rec. 709 at each of the A angles."""
+    """Returns the metal's reflectance (A, 3) in linear Rec. 709 at each of the A angles."""
     wavelength = np.arange(360.0, 831.0)
     eta, k = (np.interp(wavelength, spectrum.wavelength, values) for values in (spectrum.eta, spectrum.k))
     return reflectance(eta, k, cos[:, None]) @ rgb_weights(wavelength)
@@ -129,8 +129,8 @@ def fit(spectrum: Spectrum) -> Fit:
 
 
 def _least_squares(curve: Array, start: Array, least_eta: float, most_k: float) -> Array:
-    """(eta, k) by the Levenberg-Marquardt method, which works on their logarithms. start (2,): logarithms of the first guess;
-    the bounds are logarithms too."""
+    """Returns (eta, k) by the Levenberg-Marquardt method, which works on their logarithms. start (2,): logarithms of the first
+    guess; the bounds are logarithms too."""
 
     def residuals(logs: Array) -> Array:
         eta, k = np.exp(logs)
@@ -157,7 +157,7 @@ def _least_squares(curve: Array, start: Array, least_eta: float, most_k: float) 
 
 
 def rounded(values: Array) -> list[float]:
-    """The values rounded to four digits, as presets have them."""
+    """Returns the values rounded to four digits, as presets have them."""
     return [float(f"{value:.4g}") for value in values]
 
 

@@ -86,7 +86,7 @@ SAID = {
 
 
 def kind(schema: Mapping[str, Any]) -> str:
-    """The text of the column "takes": the values that a key allows, in words."""
+    """Returns the text of the column "takes": the values that a key allows, in words."""
     if "const" in schema:
         return f'`"{schema["const"]}"`'
     if "enum" in schema:
@@ -127,7 +127,7 @@ def _bounds(schema: Mapping[str, Any]) -> str:
 
 
 def default(schema: Mapping[str, Any], key: str) -> str:
-    """The text of the column "default": the default as a scene file would write it."""
+    """Returns the text of the column "default": the default as a scene file would write it."""
     if "default" not in schema:
         # The schema has no defaults that are computed. These keys have one.
         return "-" if key in {"film", "camera", "transform", "quality"} else "required"
@@ -146,7 +146,7 @@ def default(schema: Mapping[str, Any], key: str) -> str:
 
 
 def table(model: type[Document], without: type[Document] | None = None) -> str:
-    """The table of a class's keys. without: a base class whose keys are left out, since they have a table of their own."""
+    """Returns the table of a class's keys. without: a base class whose keys are left out, since they have a table of their own."""
     known = set(without.model_fields) if without else set()
     rows = []
     for key, schema in model.model_json_schema()["properties"].items():
@@ -174,7 +174,7 @@ def _limits(declared: Mapping[str, Any]) -> str:
 
 
 def about(model: type[Document]) -> str:
-    """The docstring of a class as one paragraph."""
+    """Returns the docstring of a class as one paragraph."""
     return " ".join((model.__doc__ or "").split()) + "\n"
 
 
@@ -183,7 +183,7 @@ def section(level: int, title: str, model: type[Document], without: type[Documen
 
 
 def scene_file() -> str:
-    """The text of docs/scene-file.md."""
+    """Returns the text of docs/scene-file.md."""
     text = INTRODUCTION
     text += section(2, "Scene", Scene) + section(2, "Film", Film)
     text += section(2, "Camera", Camera)

@@ -64,7 +64,7 @@ def plans() -> Iterator[ProgramPlan]:
 
 
 def sources() -> Iterator[Source]:
-    """The sources of all plans, and of the few programs that have no plan."""
+    """Yields the sources of all plans, and of the few programs that have no plan."""
     yield from (generate(one) for one in dict.fromkeys(plans()))
     for encoding in ("linear", "srgb"):
         output = {"output": Code().include(f"output/{encoding}.glsl")}
@@ -77,7 +77,7 @@ def sources() -> Iterator[Source]:
 
 
 def driver_stages() -> Iterator[tuple[Stage, str]]:
-    """The stages that measure the driver, with their suffixes: each for both versions of GLSL that they are compiled in."""
+    """Yields the stages that measure the driver, with their suffixes: each for both versions of GLSL that they are compiled in."""
     for path in sorted((SHIPPED / "driver").iterdir()):
         if path.suffix in (".vert", ".frag"):
             for version in ("330", "400"):

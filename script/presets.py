@@ -44,7 +44,7 @@ Measurements of one metal differ by more than that, depending on the film, its a
 
 
 def page() -> str:
-    """The text of docs/presets.md."""
+    """Returns the text of docs/presets.md."""
     rows = [f"| `{name}` | `{p.material['brdf']}` | {p.description} | {p.source} |\n" for name, p in PRESETS.items()]
     return INTRODUCTION + "".join(rows) + METALS
 

@@ -272,7 +272,7 @@ def _world(placed: dict[str | None, tuple[Array, str | None]], item: Object) -> 
 
 
 def _is_in_range(world: Array) -> bool:
-    """Whether the numbers of a transform (4, 4) are in the range whose squares and cubes fit into float64; NaN is not."""
+    """Returns whether the numbers of a transform (4, 4) are in the range whose squares and cubes fit into float64; NaN is not."""
     sizes = np.abs(world[:3, :3]).max(axis=0)
     return bool(np.abs(world).max() <= LARGEST_NUMBER and sizes.min() >= SMALLEST_NUMBER)
 
@@ -284,7 +284,7 @@ def _placed(points: Array, world: Array) -> Array:
 
 
 def _draws_back_faces(piece: _Piece, material: Brdf, view: View) -> bool:
-    """Whether an object's back faces are drawn.
+    """Returns whether an object's back faces are drawn.
 
     By default they are culled where the mesh is solid and seen from outside, since none of them is visible then.
     """

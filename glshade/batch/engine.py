@@ -92,7 +92,7 @@ class Engine(Protocol):
 
 @contextmanager
 def interrupts(stop: Any) -> Iterator[list[bool]]:
-    """A context manager within which the first Ctrl-C calls `stop` and the second raises KeyboardInterrupt.
+    """Returns a context manager within which the first Ctrl-C calls `stop` and the second raises KeyboardInterrupt.
 
     It yields a list, which is empty until the first Ctrl-C.
     """

@@ -77,7 +77,7 @@ class Process:
         self._rest = b""
 
     def takes(self) -> bool:
-        """Whether the worker should get one more task."""
+        """Returns whether the worker should get one more task."""
         if not self.greeted or self.stdin.closed or self.alone:
             return False
         return not self.tasks or (self.quick and len(self.begun) == len(self.tasks))

@@ -102,7 +102,7 @@ def run_contest(work: Work, programs: Sequence[str], repeat: int) -> list[Contes
 
 @contextmanager
 def _excused(name: str, faults: dict[str, str]) -> Iterator[None]:
-    """A context manager within which a ProgramError is stored in `faults`, or raised if the program is glshade."""
+    """Returns a context manager within which a ProgramError is stored in `faults`, or raised if the program is glshade."""
     try:
         yield
     except ProgramError as error:

@@ -160,7 +160,9 @@ def _print(study: Study, metric: str) -> None:
 
 @contextmanager
 def _progress() -> Iterator[Progress]:
-    """A context manager that yields a function to show progress on stderr: a bar on a terminal, elsewhere up to PARTS lines."""
+    """Returns a context manager that yields a function to show progress on stderr: a bar on a terminal, elsewhere up to PARTS
+    lines.
+    """
     import sys
 
     if not sys.stderr.isatty():

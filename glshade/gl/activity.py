@@ -11,7 +11,7 @@ from glshade.glsl.source import Source
 
 
 def active(source: Source, context: Any) -> Interface:
-    """The variables of a program that the driver reports as active, in alphabetical order.
+    """Returns the variables of a program that the driver reports as active, in alphabetical order.
 
     source: the text of the program, which is compiled here.
     context: a glshade.gl.context.Context.
@@ -27,7 +27,7 @@ def active(source: Source, context: Any) -> Interface:
 
 
 def with_active(explanation: Explanation, context: Any) -> Explanation:
-    """The explanation with the variables that the driver reports as active, and with the driver's name.
+    """Returns the explanation with the variables that the driver reports as active, and with the driver's name.
 
     explanation: the explanation without a driver.
     context: a glshade.gl.context.Context.

@@ -30,7 +30,7 @@ class Binaries:
         self.folder = self._cache.part("programs")
 
     def recall(self, key: str) -> Binary | None:
-        """The binary of a key; None if no file has it, or if its file is damaged: a damaged binary may crash a driver."""
+        """Returns the binary of a key; None if no file has it, or if its file is damaged: a damaged binary may crash a driver."""
         path = self.path(key)
         try:
             entry = path.read_bytes()
@@ -61,7 +61,7 @@ class Binaries:
             self._cache.added(path)
 
     def path(self, key: str) -> Path:
-        """The path of the file of a key."""
+        """Returns the path of the file of a key."""
         return self.folder / f"{key}.bin"
 
 

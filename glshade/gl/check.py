@@ -60,7 +60,7 @@ class Check:
         return SceneError.exit_code if in_scenes else ShaderError.exit_code
 
     def as_dict(self) -> dict[str, Any]:
-        """The result as JSON types."""
+        """Returns the result as JSON types."""
         return {
             "programs": self.programs,
             "problems": [problem.as_dict() for problem in self.problems],
@@ -102,7 +102,7 @@ def check_files(
 
 
 def problems_of_scene(context: Context, scene: Scene, shaders: Shaders) -> list[Problem]:
-    """All errors of the programs of a scene and of its layers, each once, by file and line.
+    """Returns all errors of the programs of a scene and of its layers, each once, by file and line.
 
     context: the context to compile in.
     scene: the scene.
@@ -153,7 +153,7 @@ class _Checker:
         return seen
 
     def finished(self) -> Check:
-        """The result, with its problems in order and each of them once."""
+        """Returns the result, with its problems in order and each of them once."""
         self.result.programs = len(self._compiled)
         self.result.problems = sorted(distinct(self.result.problems), key=_place)
         return self.result
@@ -164,7 +164,7 @@ def _place(problem: Problem) -> tuple[str, int, int]:
 
 
 def _of_scene(scene: Scene, shaders: Shaders) -> Iterator[Maker]:
-    """The programs of a scene's picture in both encodings, and of the parts that its layers are made of."""
+    """Yields the programs of a scene's picture in both encodings, and of the parts that its layers are made of."""
     parts: list[Part | None] = [None]
     if scene.film.aovs:
         parts += [Part(kind) for kind in LAYERS] + [Part("light", index) for index in range(len(ready(scene).lights))]
@@ -184,12 +184,12 @@ def _covering(names: tuple[str, ...] | None, shaders: Shaders) -> Iterator[Maker
 
 
 def _models_of(files: list[Path], shaders: Shaders) -> tuple[str, ...] | None:
-    """The names of the models if all of these shader files are files of models; None for all models."""
+    """Returns the names of the models if all of these shader files are files of models; None for all models."""
     names = [path.stem for path in files if path.stem in BRDFS and _is_read(path, shaders)]
     return tuple(names) if names and len(names) == len(files) else None
 
 
 def _is_read(path: Path, shaders: Shaders) -> bool:
-    """Whether a file is the one that is read for the model of its name."""
+    """Returns whether a file is the one that is read for the model of its name."""
     file = shaders.find(f"brdf/{path.stem}.glsl")
     return file is not None and os.path.realpath(file.path) == os.path.realpath(path)

@@ -137,7 +137,7 @@ class Context:
         return int(min(info["GL_MAX_TEXTURE_SIZE"], info["GL_MAX_RENDERBUFFER_SIZE"], *info["GL_MAX_VIEWPORT_DIMS"]))
 
     def procedure(self, name: str, result: Any, *arguments: Any) -> Callable[..., Any] | None:
-        """A GL function that moderngl does not wrap; None if the driver does not have it.
+        """Returns a GL function that moderngl does not wrap; None if the driver does not have it.
 
         name: the name of the function.
         result: the ctypes type of its result; None if it returns nothing.
@@ -238,7 +238,9 @@ def _open_osmesa(cached: bool, instead_of: ContextError | None = None) -> Contex
 
 
 def _wrapped(window: Any, backend: str, cached: bool) -> tuple[moderngl.Context, Linker | None]:
-    """A moderngl context around a context of glcontext or OSMesa, and the linker between them, or None without a linker."""
+    """Returns a moderngl context around a context of glcontext or OSMesa, and the linker between them, or None without a
+    linker.
+    """
     linker = None
     if cached:
         from glshade.gl.binaries import Binaries
@@ -261,7 +263,7 @@ def _checked(context: Context) -> Context:
 
 
 def load_egl() -> ctypes.CDLL:
-    """The EGL library. Errors: ContextError if it is missing."""
+    """Returns the EGL library. Errors: ContextError if it is missing."""
     reserve_index()
     try:
         return ctypes.CDLL(LIBEGL)
@@ -270,7 +272,7 @@ def load_egl() -> ctypes.CDLL:
 
 
 def devices() -> list[Device]:
-    """The EGL devices, in EGL's order. Errors: ContextError without EGL or without its device extensions."""
+    """Returns the EGL devices, in EGL's order. Errors: ContextError without EGL or without its device extensions."""
     egl = load_egl()
     egl.eglGetProcAddress.restype = ctypes.c_void_p
     egl.eglQueryString.restype = ctypes.c_char_p

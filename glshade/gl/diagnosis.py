@@ -46,7 +46,7 @@ _ANY_VERTEX_STAGE = "#version 330 core\nvoid main() {\n    gl_Position = vec4(0.
 
 
 def diagnose(context: Context, source: Source) -> list[Problem]:
-    """The errors of a program, each once; empty if it compiles and links.
+    """Returns the errors of a program, each once; empty if it compiles and links.
 
     context: the context to compile in.
     source: the text of the program.
@@ -66,7 +66,7 @@ def diagnose(context: Context, source: Source) -> list[Problem]:
 
 
 def distinct(problems: list[Problem] | tuple[Problem, ...]) -> list[Problem]:
-    """The problems without repetitions, in their order.
+    """Returns the problems without repetitions, in their order.
 
     A file that stands in both stages, or in many programs, is reported once. The lines of generated text have other numbers in
     other programs, so there the text of the line counts in place of its number.
@@ -109,7 +109,7 @@ class _Search:
         self._missing: set[str] = set()
 
     def messages(self) -> list[Message]:
-        """All errors of the stage, in the order in which they were found."""
+        """Returns all errors of the stage, in the order in which they were found."""
         found: list[Message] = []
         lines: set[int | None] = set()
         for round_ in range(MOST_ROUNDS):
@@ -123,7 +123,7 @@ class _Search:
         return found
 
     def _errors(self) -> list[Message]:
-        """The errors that the compiler reports about what is left."""
+        """Returns the errors that the compiler reports about what is left."""
         text = "\n".join(self._left()) + "\n"
         try:
             if self._where == "vertex":
@@ -138,7 +138,7 @@ class _Search:
         return []
 
     def _left(self) -> list[str]:
-        """The lines of the text that are left; all others are empty, so that the numbers of the lines stay."""
+        """Returns the lines of the text that are left; all others are empty, so that the numbers of the lines stay."""
         lines = list(self._lines)
         for block in self._blocks:
             if block.state != "whole":
@@ -147,7 +147,7 @@ class _Search:
         return lines
 
     def _follows(self, error: Message) -> bool:
-        """Whether the error may be a consequence of a definition that is left out."""
+        """Returns whether the error may be a consequence of a definition that is left out."""
         if not self._missing or error.line is None:
             return False
         line = self._lines[min(error.line, len(self._lines)) - 1]
@@ -213,7 +213,7 @@ class _Search:
         return False
 
     def _goes_away(self, error: Message, index: int, line: str) -> bool:
-        """Whether an error goes away with another line in place of the one at `index`, which then stays in its place."""
+        """Returns whether an error goes away with another line in place of the one at `index`, which then stays in its place."""
         old, self._lines[index] = self._lines[index], line
         if self._has(error):
             self._lines[index] = old
@@ -221,11 +221,12 @@ class _Search:
         return True
 
     def _has(self, error: Message) -> bool:
-        """Whether what is left still has an error at the place of this one."""
+        """Returns whether what is left still has an error at the place of this one."""
         return any((other.line, other.column) == (error.line, error.column) for other in self._errors())
 
     def _is_unfinished(self, before: _Block, error: Message) -> bool:
-        """Whether an error of syntax in a head goes away without the definition before it, or with a semicolon after that one.
+        """Returns whether an error of syntax in a head goes away without the definition before it, or with a semicolon after
+        that one.
 
         If so, the definition before is left without its body, or gets its semicolon: it lacks its last bracket or semicolon.
         """
@@ -240,7 +241,7 @@ class _Search:
 
 
 def _causes(errors: list[Message]) -> list[Message]:
-    """The errors without those that a compiler reports only because of another error in the same line.
+    """Returns the errors without those that a compiler reports only because of another error in the same line.
 
     After an undeclared name, Mesa reports also that the sum with it is not a number. So the first error of a line counts, and
     those about other names.
@@ -253,7 +254,7 @@ def _causes(errors: list[Message]) -> list[Message]:
 
 
 def _blocks(lines: list[str]) -> list[_Block]:
-    """The definitions at the outermost level.
+    """Returns the definitions at the outermost level.
 
     Each starts in the first column, as clang-format writes it, and reaches to a line that starts with a closing brace, or to
     the start of the next.
@@ -273,7 +274,7 @@ def _blocks(lines: list[str]) -> list[_Block]:
 
 
 def _head(lines: list[str], block: _Block) -> list[str]:
-    """The lines of a function's head, made a declaration; empty for a definition that is no function."""
+    """Returns the lines of a function's head, made a declaration; empty for a definition that is no function."""
     head: list[str] = []
     for line in lines[block.first : block.end]:
         code = line.partition("//")[0]
@@ -285,7 +286,7 @@ def _head(lines: list[str], block: _Block) -> list[str]:
 
 
 def _introduced(lines: list[str], is_function: bool) -> set[str]:
-    """The names that a definition introduces. Its lines may have errors, so this may return some names too many."""
+    """Returns the names that a definition introduces. Its lines may have errors, so this may return some names too many."""
     code = "\n".join(line.partition("//")[0] for line in lines)
     named = re.search(r"(\w+)\s*\(", code) if is_function else re.search(r"\bstruct\s+(\w+)", code)
     if named:

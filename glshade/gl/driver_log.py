@@ -43,7 +43,7 @@ class Message:
 
 
 def messages(log: str) -> Iterator[Message]:
-    """The messages in the log of a compiler or linker."""
+    """Yields the messages in the log of a compiler or linker."""
     for raw in log.splitlines():
         match = _MESA.match(raw) or _NVIDIA.match(raw) or _OTHERS.match(raw)
         if match:
@@ -56,7 +56,7 @@ def messages(log: str) -> Iterator[Message]:
 
 
 def problem(message: Message, stage: Stage, where: Where) -> Problem:
-    """A message about a stage as a problem with an excerpt.
+    """Returns a message about a stage as a problem with an excerpt.
 
     message: the message; lines beyond the end of the stage count as the last one.
     stage: the stage that the message's line refers to.
@@ -72,7 +72,8 @@ def problem(message: Message, stage: Stage, where: Where) -> Problem:
 
 
 def problems_of_log(log: str, source: Source) -> list[Problem]:
-    """The problems in a moderngl error, without warnings. Its heading, `vertex_shader` or `fragment_shader`, tells the stage.
+    """Returns the problems in a moderngl error, without warnings. Its heading, `vertex_shader` or `fragment_shader`, tells the
+    stage.
 
     log: the message of the error.
     source: the text of the program.
@@ -87,7 +88,7 @@ def problems_of_log(log: str, source: Source) -> list[Problem]:
 
 
 def _column(line: str, column: int) -> int:
-    """The column in a line of the text, from 1.
+    """Returns the column in a line of the text, from 1.
 
     column: the column that the driver counts, from 1. Mesa counts in the preprocessor's output, in which runs of white space
         and comments are one space.
@@ -102,7 +103,7 @@ def _column(line: str, column: int) -> int:
 
 
 def _with_excerpt(problem: Problem, stage: Stage, index: int) -> Problem:
-    """The problem with the lines around it. index: the index of its line in the stage."""
+    """Returns the problem with the lines around it. index: the index of its line in the stage."""
     text, (file, number) = stage.text.splitlines(), stage.lines[index]
     around = range(max(index - AROUND, 0), min(index + AROUND + 1, len(text)))
     # Functions that the program does not need are left out of the stage, so the numbers of the lines may jump.
@@ -112,7 +113,7 @@ def _with_excerpt(problem: Problem, stage: Stage, index: int) -> Problem:
 
 
 def _link_problem(message: Message, source: Source) -> Problem:
-    """A message of the linker, with the place in each stage of the variable or function that it is about."""
+    """Returns a message of the linker, with the place in each stage of the variable or function that it is about."""
     stages = [(stage, _subject(message.text, stage)) for stage in source.stages]
     kinds = ("vertex", "fragment")
     places = [

@@ -30,7 +30,7 @@ def evaluate(
     shaders: Folders | None = None,
     models: Folders | None = None,
 ) -> NDArray[Any]:
-    """The values f cos (..., 3) of a model [1/sr], where f is its BRDF and cos the cosine between the normal and l.
+    """Returns the values f cos (..., 3) of a model [1/sr], where f is its BRDF and cos the cosine between the normal and l.
 
     brdf: a model with its parameters, for example Phong(kd=0.5); none of them may be a texture.
     l: unit directions (..., 3) to the light, of any leading shape, in the local frame, where the normal is +z and the tangent

@@ -73,7 +73,7 @@ class Frame:
         self.target.clear(*background, depth=0.0)
 
     def resolve(self) -> moderngl.Texture:
-        """The texture of colours with one sample per pixel: several samples are averaged into it."""
+        """Returns the texture of colours with one sample per pixel: several samples are averaged into it."""
         if self.target is not self._resolved:
             self._gl.copy_framebuffer(self._resolved, self.target)
         return self.texture

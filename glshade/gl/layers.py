@@ -42,7 +42,7 @@ class Draws(Protocol):
 
 
 def draw_layers(renderer: Draws, scene: Scene, dtype: str, shading: Rate | None, tile: int | None) -> Layers:
-    """The picture of a scene and the layers that its film asks for.
+    """Returns the picture of a scene and the layers that its film asks for.
 
     renderer: the renderer that draws.
     scene: the scene to draw.
@@ -87,7 +87,7 @@ class _Maker:
         self.attributes: dict[str, str] = {}
 
     def _draw(self, part: Part) -> Array:
-        """The pixels (H, W, 4) of a part of the scene."""
+        """Returns the pixels (H, W, 4) of a part of the scene."""
         (pixels,) = self._renderer.draw_part(self._scene, part, shading=self._shading, tile=self._tile)
         return pixels
 
@@ -114,7 +114,7 @@ class _Maker:
         return self._ids("material_id", materials, list(dict.fromkeys(materials)))
 
     def _ids(self, layer: str, instance_names: list[str], names: list[str]) -> Arrays:
-        """A layer of numbers: each pixel has the position (from 1) of its instance's name in `names`, or 0 for none."""
+        """Returns a layer of numbers: each pixel has the position (from 1) of its instance's name in `names`, or 0 for none."""
         ids = {name: index + 1 for index, name in enumerate(names)}
         self.attributes[f"glshade:{layer}"] = names_attribute(names)
         values = np.array([*(ids[name] for name in instance_names), 0], dtype=np.float32)
@@ -178,24 +178,24 @@ class _Maker:
 
 
 def _instances(pixels: Array) -> Numbers:
-    """The index (H, W) of the instance in each pixel of a picture of depths; -1 where there is no surface."""
+    """Returns the index (H, W) of the instance in each pixel of a picture of depths; -1 where there is no surface."""
     return np.where(pixels[..., 3] > 0, pixels[..., 1], -1).astype(np.int32)
 
 
 def _float32(value: NDArray[np.float64]) -> Array:
-    """The values in float32. Those beyond its range become infinite, as they would in a file."""
+    """Returns the values in float32. Those beyond its range become infinite, as they would in a file."""
     with np.errstate(over="ignore"):
         return value.astype(np.float32)
 
 
 def mask_points(film: Film) -> list[Offset]:
-    """The points of a pixel at which masks are sampled, as offsets from its centre: an even grid, at least as fine as the
-    picture's supersampling."""
+    """Returns the points of a pixel at which masks are sampled, as offsets from its centre: an even grid, at least as fine as
+    the picture's supersampling."""
     return shifts(max(POINTS, film.supersample))
 
 
 def positions(depth: NDArray[np.float64], assembly: Assembly, film: Film) -> NDArray[np.float64]:
-    """The positions (H, W, 3) in the world [scene units] of the points that are seen at the centres of the pixels.
+    """Returns the positions (H, W, 3) in the world [scene units] of the points that are seen at the centres of the pixels.
 
     depth: the depths (H, W) of these points along the view axis [scene units].
     assembly: the assembled scene.
@@ -213,7 +213,7 @@ def positions(depth: NDArray[np.float64], assembly: Assembly, film: Film) -> NDA
 
 
 def light_layers(assembly: Assembly) -> list[str]:
-    """The name of each light's layer: `light_` with the light's name or index.
+    """Returns the name of each light's layer: `light_` with the light's name or index.
 
     Characters that are not letters, digits or _ are replaced, because EXR files separate layers and channels by dots.
     """

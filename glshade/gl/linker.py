@@ -89,7 +89,7 @@ class Linker:
                 self._own[name] = _SIGNATURES[name](self._storing_exceptions(own))
 
     def load_opengl_function(self, name: str) -> int:
-        """The address of a GL function, 0 if the driver does not have it."""
+        """Returns the address of a GL function, 0 if the driver does not have it."""
         own = self._own.get(name)
         return self._window.load_opengl_function(name) if own is None else ctypes.cast(own, _pointer).value or 0
 
@@ -104,7 +104,8 @@ class Linker:
         self._window.release()
 
     def program(self, gl: moderngl.Context, vertex: str, fragment: str | None) -> moderngl.Program:
-        """The linked program of two texts, from the disk cache if it is there; else it is compiled and added to the cache.
+        """Returns the linked program of two texts, from the disk cache if it is there; else it is compiled and added to the
+        cache.
 
         gl: the moderngl context that was made with this Linker.
         vertex: the text of the vertex stage.
@@ -127,12 +128,12 @@ class Linker:
         return program
 
     def key(self, vertex: str, fragment: str | None) -> str:
-        """The cache key of a program: a digest of its texts, the driver, the driver's formats and settings, the processor and
-        glshade's version."""
+        """Returns the cache key of a program: a digest of its texts, the driver, the driver's formats and settings, the
+        processor and glshade's version."""
         return hashlib.sha256("\0".join((self._driver, vertex, fragment or "")).encode()).hexdigest()
 
     def _make(self, gl: moderngl.Context, vertex: str, fragment: str | None, binary: Binary | None) -> moderngl.Program:
-        """The program, loaded from a binary if one is given and the driver accepts it, else compiled from its texts."""
+        """Returns the program, loaded from a binary if one is given and the driver accepts it, else compiled from its texts."""
         self._binary_to_load, self._accepted, self._raised = binary, False, None
         try:
             return gl.program(vertex, fragment)
@@ -142,8 +143,8 @@ class Linker:
                 raise self._raised
 
     def _storing_exceptions(self, function: Callable[..., None]) -> Callable[..., None]:
-        """A callback that stores the exceptions of a function, for _make() to raise: ctypes would only print them, so that a
-        KeyboardInterrupt would be lost."""
+        """Returns a callback that stores the exceptions of a function, for _make() to raise: ctypes would only print them, so
+        that a KeyboardInterrupt would be lost."""
 
         def called(*arguments: Any) -> None:
             try:
@@ -184,14 +185,14 @@ class Linker:
         self._gl["glLinkProgram"](program)
 
     def _binary(self, program: int) -> Binary | None:
-        """The binary of a linked program; None if the driver gives none."""
+        """Returns the binary of a linked program; None if the driver gives none."""
         data = ctypes.create_string_buffer(self._ask_program(program, GL_PROGRAM_BINARY_LENGTH))
         kind, length = _uint(), _int()
         self._gl["glGetProgramBinary"](program, len(data), ctypes.byref(length), ctypes.byref(kind), data)
         return (kind.value, data.raw[: length.value]) if length.value > 0 else None
 
     def _formats(self) -> list[int]:
-        """The numbers of the driver's binary formats, in ascending order."""
+        """Returns the numbers of the driver's binary formats, in ascending order."""
         count = _int()
         self._gl["glGetIntegerv"](GL_NUM_PROGRAM_BINARY_FORMATS, ctypes.byref(count))
         formats = (_int * max(count.value, 0))()
@@ -200,7 +201,7 @@ class Linker:
         return sorted(formats)
 
     def _ask_program(self, program: int, name: int) -> int:
-        """An integer property of a program (glGetProgramiv)."""
+        """Returns an integer property of a program (glGetProgramiv)."""
         value = _int()
         self._gl["glGetProgramiv"](program, name, ctypes.byref(value))
         return value.value

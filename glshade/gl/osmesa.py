@@ -37,7 +37,7 @@ def check_driver() -> None:
 
 
 def load() -> ctypes.CDLL:
-    """The OSMesa library. Errors: ContextError if it is missing."""
+    """Returns the OSMesa library. Errors: ContextError if it is missing."""
     reserve_index()
     for name in LIBRARIES:
         try:
@@ -81,7 +81,7 @@ class OSMesa:
         return bool(self._library.OSMesaMakeCurrent(self._context, self._buffer, GL_UNSIGNED_BYTE, 1, 1))
 
     def load_opengl_function(self, name: str) -> int:
-        """The address of a GL function, 0 if the driver does not have it."""
+        """Returns the address of a GL function, 0 if the driver does not have it."""
         return self._library.OSMesaGetProcAddress(name.encode()) or 0
 
     def __enter__(self) -> None:

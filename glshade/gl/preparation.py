@@ -85,7 +85,7 @@ class Prepared:
     attributes: dict[str, str] | None = None
 
     def is_current(self) -> bool:
-        """Whether none of its shader files has changed."""
+        """Returns whether none of its shader files has changed."""
         return self.shaders.is_current(self.files)
 
     @property
@@ -126,7 +126,7 @@ class Preparer:
     def prepare(
         self, scene: Scene, assembly: Assembly, encoding: Encoding, shaders: Shaders, rewrite: Rewrite | None = None
     ) -> Prepared:
-        """The scene ready to draw, with everything that stays the same from picture to picture.
+        """Returns the scene ready to draw, with everything that stays the same from picture to picture.
 
         scene: the scene to draw.
         assembly: the assembled scene.
@@ -158,7 +158,7 @@ class _Calls:
         self._flat = self._context.is_software and triangles * FLAT_PIXELS <= width * height
 
     def draw_calls(self, encoding: Encoding) -> Iterator[DrawCall]:
-        """The draw calls: opaque instances grouped by program, then blended ones from back to front."""
+        """Yields the draw calls: opaque instances grouped by program, then blended ones from back to front."""
         opaque: list[tuple[ProgramPlan, Instance]] = []
         blended: list[tuple[ProgramPlan, Instance]] = []
         for instance in self._assembly.instances:
@@ -194,7 +194,7 @@ class _Calls:
     def _of_instance(
         self, plan: ProgramPlan, instance: Instance, lights: Values, pages: list[list[Page]]
     ) -> Iterator[DrawCall]:
-        """The first draw call of an instance, and one more for every further page of lights."""
+        """Yields the first draw call of an instance, and one more for every further page of lights."""
         assembly = self._assembly
         triangles = _sorted_triangles(instance, assembly) if plan.alpha == "blend" else facing(instance, assembly.view)
         for index in range(max((len(group) for group in pages), default=1)):
@@ -219,7 +219,7 @@ class _Calls:
         return self._programs[plan]
 
     def _pages(self, plan: ProgramPlan, instance: Instance) -> list[list[Page]]:
-        """The pages of lights of each group that has no exact count."""
+        """Returns the pages of lights of each group that has no exact count."""
         result = []
         for group in _paged(plan):
             lights = [self._assembly.lights[i] for i in instance.lights if group.holds(self._assembly.lights[i])]
@@ -230,7 +230,7 @@ class _Calls:
 
 
 def _mesh_size(mesh: Mesh) -> int:
-    """The approximate size of a mesh on the CPU and the GPU together [bytes].
+    """Returns the approximate size of a mesh on the CPU and the GPU together [bytes].
 
     All attributes of a vertex together count as three times its position.
     """
@@ -242,7 +242,8 @@ def _paged(plan: ProgramPlan) -> list[LightGroup]:
 
 
 def _further(plan: ProgramPlan, instance: Instance, pages: list[list[Page]], index: int) -> ProgramPlan:
-    """The plan of a further page of lights. The first call has already drawn ambient light and groups with an exact count.
+    """Returns the plan of a further page of lights. The first call has already drawn ambient light and groups with an exact
+    count.
 
     plan: the plan of the first call.
     instance: the instance that is drawn.
@@ -265,7 +266,7 @@ def _check_finite(instance: Instance, values: Values) -> None:
 
 
 def _sorted_triangles(instance: Instance, assembly: Assembly) -> NDArray[np.uint32]:
-    """The triangles (T, 3) of an instance, ordered by their centroids from back to front."""
+    """Returns the triangles (T, 3) of an instance, ordered by their centroids from back to front."""
     centroids = instance.mesh.positions[instance.mesh.triangles].mean(axis=1, dtype=np.float64)
     world = centroids @ instance.world_from_object[:3, :3].T + instance.world_from_object[:3, 3]
     return instance.mesh.triangles[np.argsort(-assembly.view.depth(world), kind="stable")]

@@ -117,6 +117,6 @@ class Program:
 
 
 def _type(member: Any) -> str:
-    """The GLSL type of a uniform or an attribute; its number in hexadecimal digits if TYPES does not have it."""
+    """Returns the GLSL type of a uniform or an attribute; its number in hexadecimal digits if TYPES does not have it."""
     name = TYPES.get(member.gl_type, f"{member.gl_type:#06x}")
     return f"{name}[{member.array_length}]" if member.array_length > 1 else name

@@ -90,7 +90,7 @@ class Renderer:
         self.context.release()
 
     def render(self, scene: Scene, *, dtype: DType = "uint8", shading: Rate | None = None, tile: int | None = None) -> Image:
-        """The picture of a scene.
+        """Returns the picture of a scene.
 
         scene: the scene to draw.
         dtype: "uint8" for the picture in the film's encoding, "float32" for linear light, signed and unclipped.
@@ -108,7 +108,7 @@ class Renderer:
             return self._render(scene, dtype, shading, tile)
 
     def layers(self, scene: Scene, *, dtype: DType = "float32", shading: Rate | None = None, tile: int | None = None) -> Layers:
-        """The picture of a scene with the layers that its film asks for (`aovs`). Arguments and errors as for `render`."""
+        """Returns the picture of a scene with the layers that its film asks for (`aovs`). Arguments and errors as for `render`."""
         from glshade.gl.layers import draw_layers
 
         return draw_layers(self, scene, dtype, shading, tile)
@@ -149,7 +149,7 @@ class Renderer:
             yield pixels
 
     def drawing(self, scene: Scene) -> Callable[[], float]:
-        """A function that draws the scene's linear picture and returns the time that the drawing took [s].
+        """Returns a function that draws the scene's linear picture and returns the time that the drawing took [s].
 
         It measures wall-clock time from the first clear until the driver has finished, without assembling, uploading and
         reading back. Its first call draws twice and times the second drawing, because drivers compile at the first one.
@@ -184,7 +184,7 @@ class Renderer:
         return draw
 
     def prepare(self, scene: Scene, shading: Rate | None, encoding: Encoding, part: Part | None = None) -> Prepared:
-        """The scene ready to draw, from the cache if neither the scene nor a shader file has changed.
+        """Returns the scene ready to draw, from the cache if neither the scene nor a shader file has changed.
 
         The context must be current.
         scene: the scene to draw.
@@ -215,11 +215,11 @@ class Renderer:
             self.context.gl.gc()
 
     def _shaders(self) -> Shaders:
-        """The shader files to draw with. Errors: ShaderError."""
+        """Returns the shader files to draw with. Errors: ShaderError."""
         return current(self._folders) if self.shaders is None else self.shaders
 
     def _is_current(self, prepared: Prepared) -> bool:
-        """Whether a prepared scene has the shader files to draw with."""
+        """Returns whether a prepared scene has the shader files to draw with."""
         return prepared.is_current() if self.shaders is None else prepared.shaders is self.shaders
 
     def draw(self, prepared: Prepared, clip: NDArray[np.float32], calls: Iterable[DrawCall] | None = None) -> None:
@@ -367,7 +367,7 @@ class Renderer:
         gl.fbo.depth_mask = not (blended or added)
 
     def _encode(self, frame: Frame, encoding: Encoding, shaders: Shaders) -> Frame:
-        """An 8-bit frame with the encoded colours of a frame in linear light."""
+        """Returns an 8-bit frame with the encoded colours of a frame in linear light."""
         texture = frame.resolve()
         picture = self.resources.frame(frame.size, "rgba8", 1)
         source = encoder(encoding, shaders)
@@ -383,7 +383,7 @@ class Renderer:
         return picture
 
     def _attributes(self, prepared: Prepared) -> dict[str, str]:
-        """The attributes of a float picture, which tell how it was made."""
+        """Returns the attributes of a float picture, which tell how it was made."""
         if prepared.attributes is None:
             prepared.attributes = {
                 "glshade:version": __version__,
@@ -395,7 +395,7 @@ class Renderer:
 
 
 def _background(colour: tuple[float, ...], encoding: Encoding) -> tuple[float, float, float, float]:
-    """The background as red, green, blue and alpha, premultiplied and encoded for the frame."""
+    """Returns the background as red, green, blue and alpha, premultiplied and encoded for the frame."""
     alpha = colour[3] if len(colour) == 4 else 1.0
     rgb = [c * alpha for c in colour[:3]]
     r, g, b = (float(c) for c in (linear_to_srgb(np.array(rgb)) if encoding == "srgb" else rgb))
@@ -412,7 +412,7 @@ def render(
     shaders: Folders | None = None,
     models: Folders | None = None,
 ) -> Image:
-    """The picture of a scene, drawn on a new context. For several pictures, one Renderer is faster.
+    """Returns the picture of a scene, drawn on a new context. For several pictures, one Renderer is faster.
 
     The arguments and errors are those of Renderer and Renderer.render.
     """

@@ -50,7 +50,7 @@ class Resources:
         self._pixels: list[NDArray[Any]] = []
 
     def program(self, source: Source, flat: bool = False) -> Program:
-        """The compiled program of a source. Sources that differ only in comments share one program.
+        """Returns the compiled program of a source. Sources that differ only in comments share one program.
 
         source: the text of the program.
         flat: whether the fragment stage gets flat inputs in place of uniforms; the pictures are the same.
@@ -78,12 +78,12 @@ class Resources:
         return self._programs, self._textures, self._frames
 
     def texture(self, texels: Texels) -> moderngl.Texture:
-        """The texture of a picture file, loaded again if the file has changed. Errors: AssetError."""
+        """Returns the texture of a picture file, loaded again if the file has changed. Errors: AssetError."""
         key = texels, texels.path.stat().st_mtime_ns
         return self._textures.find(key, lambda: upload(self.context, texels), texture_size)
 
     def frame(self, size: tuple[int, int], storage: Storage, samples: int) -> Frame:
-        """A frame to draw into, which may hold an earlier picture.
+        """Returns a frame to draw into, which may hold an earlier picture.
 
         size: width and height [pixels].
         storage: the format of the colours.
@@ -98,8 +98,8 @@ class Resources:
         return self._frames.find((size, storage, samples), lambda: Frame(self.context, size, storage, samples), bytes_of)
 
     def pixels(self, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
-        """An uninitialised array for a picture. An earlier array is reused if no image refers to it, because a new one takes
-        longer to fill."""
+        """Returns an uninitialised array for a picture. An earlier array is reused if no image refers to it, because a new one
+        takes longer to fill."""
         for array, references in zip(self._pixels, _references(self._pixels), strict=True):
             if references == FREE and array.shape == shape and array.dtype == dtype:
                 return array
@@ -108,7 +108,7 @@ class Resources:
 
 
 def texture_size(texture: moderngl.Texture) -> int:
-    """The approximate size of a float32 texture with its mipmaps [bytes]."""
+    """Returns the approximate size of a float32 texture with its mipmaps [bytes]."""
     width, height = texture.size
     numbers: int = width * height * texture.components
     # A number takes 4 bytes, and the mipmaps add a third.
@@ -116,7 +116,7 @@ def texture_size(texture: moderngl.Texture) -> int:
 
 
 def _references(arrays: list[NDArray[Any]]) -> list[int]:
-    """The number of references to each array, including those of the list and of this function."""
+    """Returns the number of references to each array, including those of the list and of this function."""
     return [sys.getrefcount(array) for array in arrays]
 
 

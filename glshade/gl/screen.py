@@ -53,7 +53,7 @@ class Screen:
         self._gl.enable_only(moderngl.NOTHING)
 
     def array(self, program: Program) -> moderngl.VertexArray:
-        """The program's vertex array without attributes, from a cache."""
+        """Returns the program's vertex array without attributes, from a cache."""
         if program not in self._arrays:
             self._arrays[program] = self._gl.vertex_array(program.gl, [])
         return self._arrays[program]
@@ -84,7 +84,9 @@ class Screen:
         array.render(moderngl.TRIANGLES)
 
     def readback(self) -> Float32:
-        """The pixels as they are stored, (H, W, 4). Colours that the format lacks read as 0, and a missing alpha reads as 1."""
+        """Returns the pixels as they are stored, (H, W, 4). Colours that the format lacks read as 0, and a missing alpha reads
+        as 1.
+        """
         width, height = self.size
         return _floats(self._target.read(components=4, dtype="f4")).reshape(height, width, 4)
 
@@ -111,7 +113,7 @@ class Capture:
         self._screen.array(program).transform(self._buffer, moderngl.POINTS, vertices=self._shape[0])
 
     def readback(self) -> Float32:
-        """The values (vertices, components) of the last draw."""
+        """Returns the values (vertices, components) of the last draw."""
         return _floats(self._buffer.read()).reshape(self._shape)
 
 

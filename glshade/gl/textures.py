@@ -21,7 +21,7 @@ GL_RGBA32F, GL_RGBA, GL_FLOAT = 0x8814, 0x1908, 0x1406
 
 
 def upload(context: Context, texels: Texels) -> moderngl.Texture:
-    """A texture with trilinear filtering. Levels that are larger than the driver allows are left out.
+    """Returns a texture with trilinear filtering. Levels that are larger than the driver allows are left out.
 
     context: the context, which must be current.
     texels: the picture and its wrap modes.
@@ -38,7 +38,7 @@ def upload(context: Context, texels: Texels) -> moderngl.Texture:
 
 
 def mipmapped(context: Context, chain: Sequence[NDArray[np.float32]]) -> moderngl.Texture:
-    """A repeating texture with trilinear filtering.
+    """Returns a repeating texture with trilinear filtering.
 
     context: the context, which must be current.
     chain: the pixels (h, w, 4) of all levels, from the largest to the one of a single pixel.

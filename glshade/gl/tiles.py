@@ -15,13 +15,13 @@ Offset = tuple[float, float]
 
 
 def shifts(count: int) -> list[Offset]:
-    """The count^2 points of an even grid over a pixel, row by row, as offsets from the pixel's centre."""
+    """Returns the count^2 points of an even grid over a pixel, row by row, as offsets from the pixel's centre."""
     steps = [(i + 0.5) / count - 0.5 for i in range(count)]
     return [(x, y) for y in steps for x in steps]
 
 
 def sample_passes(samples: int, available: int) -> list[Offset]:
-    """The offsets of the pictures that together have the wanted number of samples per pixel.
+    """Returns the offsets of the pictures that together have the wanted number of samples per pixel.
 
     samples: the wanted number of samples per pixel.
     available: the largest number of samples per pixel that the driver offers in one picture.
@@ -34,7 +34,7 @@ def sample_passes(samples: int, available: int) -> list[Offset]:
 
 
 def passes(film: Film, available: int) -> list[Offset]:
-    """The offsets of the pictures whose mean is the film's picture: one for each supersampling point and sample pass.
+    """Returns the offsets of the pictures whose mean is the film's picture: one for each supersampling point and sample pass.
 
     film: the film of the picture.
     available: the largest number of samples per pixel that the driver offers in one picture.

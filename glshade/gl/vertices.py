@@ -35,7 +35,7 @@ class Vertices:
         self._arrays: WeakKeyDictionary[Mesh, WeakKeyDictionary[Program, moderngl.VertexArray]] = WeakKeyDictionary()
 
     def array(self, mesh: Mesh, program: Program, triangles: NDArray[np.uint32] | None = None) -> moderngl.VertexArray:
-        """The vertex array that draws a mesh with a program.
+        """Returns the vertex array that draws a mesh with a program.
 
         mesh: the mesh to draw.
         program: the program to draw it with.
@@ -56,7 +56,7 @@ class Vertices:
         return self._context.gl.vertex_array(program.gl, [(buffer, layout, *names)], indices)
 
     def _buffer(self, mesh: Mesh, key: tuple[str, ...], data: Callable[[], bytes]) -> moderngl.Buffer:
-        """The cached buffer of a mesh. key: the attributes that it holds; empty for the buffer of triangles."""
+        """Returns the cached buffer of a mesh. key: the attributes that it holds; empty for the buffer of triangles."""
         buffers = self._buffers.setdefault(mesh, {})
         if key not in buffers:
             buffers[key] = self._context.gl.buffer(data())
@@ -64,5 +64,5 @@ class Vertices:
 
 
 def _interleaved(mesh: Mesh, names: tuple[str, ...]) -> bytes:
-    """The attributes of a mesh as bytes, vertex after vertex, so that the data of one vertex lies together."""
+    """Returns the attributes of a mesh as bytes, vertex after vertex, so that the data of one vertex lies together."""
     return np.hstack([getattr(mesh, ATTRIBUTES[name][0]) for name in names]).tobytes()

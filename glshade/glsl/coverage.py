@@ -31,7 +31,7 @@ def every_light(count: int) -> tuple[LightGroup, ...]:
 
 
 def plan_of_model(name: str, use: Use) -> ProgramPlan:
-    """The plan of a model with default values, all parameters used in one way, lit by one light of every kind.
+    """Returns the plan of a model with default values, all parameters used in one way, lit by one light of every kind.
 
     name: the name of the model.
     use: the way in which each parameter is used; the numbers of a texture come from its four channels in turn.
@@ -96,7 +96,9 @@ def _with_textures(base: ProgramPlan) -> Iterator[ProgramPlan]:
 
 
 def _slots(model: type[Brdf]) -> list[Any]:
-    """The different codes of the places in a model's file, found at the ends of its parameters' ranges and by its options."""
+    """Returns the different codes of the places in a model's file, found at the ends of its parameters' ranges and by its
+    options.
+    """
     tables: list[dict[str, Any]] = [{}, *_choices(model)]
     for name, declared in model.parameters().items():
         ends = {declared.low, declared.usual[1], declared.low if declared.high is None else declared.high}
@@ -106,6 +108,6 @@ def _slots(model: type[Brdf]) -> list[Any]:
 
 
 def _choices(model: type[Brdf]) -> list[dict[str, str]]:
-    """Every combination of the model's options."""
+    """Returns every combination of the model's options."""
     options = [[(name, value) for value in get_args(model.model_fields[name].annotation)] for name in model.choices()]
     return [dict(chosen) for chosen in product(*options)]

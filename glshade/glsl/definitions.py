@@ -40,12 +40,12 @@ class Definition:
 
 
 def uncommented(text: str) -> str:
-    """The text without its comments. It keeps its lines."""
+    """Returns the text without its comments. It keeps its lines."""
     return _COMMENT.sub(lambda comment: "\n" * comment[0].count("\n"), text)
 
 
 def find_definitions(lines: Sequence[str]) -> list[Definition]:
-    """The definitions in a text, in their order."""
+    """Returns the definitions in a text, in their order."""
     definitions: list[Definition] = []
     code = uncommented("\n".join(lines)).split("\n")
     at = 0
@@ -68,7 +68,7 @@ def find_definitions(lines: Sequence[str]) -> list[Definition]:
 
 
 def _end(code: Sequence[str], at: int) -> int | None:
-    """The index after the last line of the definition that starts at a line; None if it does not end cleanly.
+    """Returns the index after the last line of the definition that starts at a line; None if it does not end cleanly.
 
     code: the lines of a text without comments.
     """
@@ -83,7 +83,7 @@ def _end(code: Sequence[str], at: int) -> int | None:
 
 
 def unreached(lines: Sequence[str]) -> list[Definition]:
-    """The definitions that neither main() nor any uniform, input or output uses, directly or through other definitions."""
+    """Returns the definitions that neither main() nor any uniform, input or output uses, directly or through other definitions."""
     definitions = find_definitions(lines)
     inside = {i for definition in definitions for i in range(definition.first, definition.end)}
     declarations = uncommented("\n".join(line for i, line in enumerate(lines) if i not in inside))
@@ -99,7 +99,7 @@ def unreached(lines: Sequence[str]) -> list[Definition]:
 
 
 def _named(code: str, known: Iterable[Definition]) -> Iterable[Definition]:
-    """The known definitions that some code uses. Functions are matched by their name and number of arguments."""
+    """Yields the known definitions that some code uses. Functions are matched by their name and number of arguments."""
     words = set(_WORD.findall(code))
     calls = {(call[1], _arguments(code, call.end() - 1)) for call in _CALL.finditer(code)}
     for definition in known:
@@ -110,7 +110,7 @@ def _named(code: str, known: Iterable[Definition]) -> Iterable[Definition]:
 
 
 def _arguments(code: str, opening: int) -> int:
-    """The number of arguments between the bracket at index `opening` and the one that closes it; -1 if none closes it."""
+    """Returns the number of arguments between the bracket at index `opening` and the one that closes it; -1 if none closes it."""
     depth, count = 0, 1
     for i in range(opening, len(code)):
         depth += (code[i] == "(") - (code[i] == ")")

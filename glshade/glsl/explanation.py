@@ -46,7 +46,7 @@ class Explained:
         return None if self.active is None else tuple(sorted(self.declared.names - self.active.names))
 
     def as_dict(self) -> dict[str, Any]:
-        """The attributes as a dictionary of JSON types."""
+        """Returns the attributes as a dictionary of JSON types."""
         return {
             "program": str(self.plan),
             "draws": list(self.draws),
@@ -78,7 +78,7 @@ class Explanation:
     driver: str | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """The attributes as a dictionary of JSON types."""
+        """Returns the attributes as a dictionary of JSON types."""
         return {
             "programs": [program.as_dict() for program in self.programs],
             "variants": self.variants.as_dict(),
@@ -87,7 +87,7 @@ class Explanation:
 
 
 def explanation_of(scene: Scene, shading: Rate | None = None, shaders: Shaders | None = None) -> Explanation:
-    """The explanation of a scene without a driver: active, operations and driver are None.
+    """Returns the explanation of a scene without a driver: active, operations and driver are None.
 
     scene: the scene whose programs are explained.
     shading: optional; replaces the shading rate of every object.

@@ -21,7 +21,7 @@ _MAIN = "void main() {"
 
 @lru_cache(maxsize=256)
 def with_flat_inputs(source: Source, room: int) -> Source:
-    """The program, with uniforms of its fragment stage turned into flat inputs: the first ones, as many as fit.
+    """Returns the program, with uniforms of its fragment stage turned into flat inputs: the first ones, as many as fit.
 
     source: the program.
     room: the number of vectors that the driver passes between the stages (GL_MAX_VARYING_VECTORS).
@@ -41,7 +41,9 @@ def with_flat_inputs(source: Source, room: int) -> Source:
 
 
 def _receiving(fragment: Stage, handed: dict[int, Declaration]) -> Stage:
-    """The fragment stage with inputs in place of uniforms. A macro keeps each uniform's name valid in the rest of the text."""
+    """Returns the fragment stage with inputs in place of uniforms. A macro keeps each uniform's name valid in the rest of the
+    text.
+    """
     text: list[str] = []
     lines: list[tuple[str, int]] = []
     declared: list[tuple[int, Declaration]] = []
@@ -61,7 +63,7 @@ def _receiving(fragment: Stage, handed: dict[int, Declaration]) -> Stage:
 
 
 def _handing_on(vertex: Stage, handed: list[Declaration]) -> Stage:
-    """The vertex stage with the uniforms declared and copied to outputs."""
+    """Returns the vertex stage with the uniforms declared and copied to outputs."""
     text = vertex.text.splitlines()
     main = text.index(_MAIN)
     present = {declaration.name for declaration in vertex.declarations("uniform")}
@@ -78,5 +80,5 @@ def _handing_on(vertex: Stage, handed: list[Declaration]) -> Stage:
 
 
 def _input(uniform: Declaration, storage: Literal["in", "out"]) -> Declaration:
-    """The flat output of the vertex stage ("out") or flat input of the fragment stage ("in") that carries a uniform."""
+    """Returns the flat output of the vertex stage ("out") or flat input of the fragment stage ("in") that carries a uniform."""
     return Declaration(storage, uniform.type, f"v_{uniform.name}", uniform.count, "flat")

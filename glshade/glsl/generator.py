@@ -20,7 +20,7 @@ _sources: WeakKeyDictionary[Shaders, Lru[ProgramPlan | str, Source]] = WeakKeyDi
 
 
 def generate(plan: ProgramPlan, shaders: Shaders | None = None) -> Source:
-    """The text of the program that a plan describes. The same plan and the same files give the same text.
+    """Returns the text of the program that a plan describes. The same plan and the same files give the same text.
 
     plan: the features of the program.
     shaders: optional; the shader files. Default: those that ship with glshade.
@@ -30,7 +30,7 @@ def generate(plan: ProgramPlan, shaders: Shaders | None = None) -> Source:
 
 
 def encoder(encoding: str, shaders: Shaders) -> Source:
-    """The program that copies a picture in linear light to an encoded one.
+    """Returns the program that copies a picture in linear light to an encoded one.
 
     encoding: the name of a file in shaders/output.
     shaders: the shader files.
@@ -45,13 +45,13 @@ def encoder(encoding: str, shaders: Shaders) -> Source:
 
 
 def _kept(key: ProgramPlan | str, shaders: Shaders, make: Callable[[Shaders], Source]) -> Source:
-    """The source of a key, from the cache of these shaders; `make` is called if it is not there."""
+    """Returns the source of a key, from the cache of these shaders; `make` is called if it is not there."""
     kept = _sources.setdefault(shaders, Lru(KEPT_SOURCES))
     return kept.find(key, lambda: make(shaders), _size)
 
 
 def _size(source: Source) -> int:
-    """The approximate size of a source in memory [bytes]: its text, and a tuple of 120 bytes for each line."""
+    """Returns the approximate size of a source in memory [bytes]: its text, and a tuple of 120 bytes for each line."""
     return sum(len(stage.text) + 120 * len(stage.lines) for stage in source.stages)
 
 
@@ -99,7 +99,7 @@ def model_code(brdf: Brdf, function: str, frame: str) -> dict[str, Code]:
 
 
 def without_unreached(stage: Stage) -> Stage:
-    """The stage without the functions, structs and constants that main() does not reach."""
+    """Returns the stage without the functions, structs and constants that main() does not reach."""
     lines = stage.text.splitlines()
     removed = {i for definition in unreached(lines) for i in range(definition.first, definition.end)}
     return stage.only([i for i in range(len(lines)) if i not in removed])
@@ -138,7 +138,7 @@ TYPES = {"position": "vec3", "normal": "vec3", "tangent": "vec4", "uv": "vec2", 
 
 
 def _wanted(plan: ProgramPlan) -> list[str]:
-    """The names of the surface quantities that the shading uses, in the order of TYPES."""
+    """Returns the names of the surface quantities that the shading uses, in the order of TYPES."""
     asked = {
         "position": plan.positions,
         "normal": plan.oriented,
@@ -150,19 +150,19 @@ def _wanted(plan: ProgramPlan) -> list[str]:
 
 
 def _wanted_by_alpha(plan: ProgramPlan) -> list[str]:
-    """The names of the surface quantities that the opacity depends on."""
+    """Returns the names of the surface quantities that the opacity depends on."""
     asked = {"uv": plan.alpha_from is not None, "colour": plan.vertex_colours and plan.alpha != "opaque"}
     return [name for name, is_asked in asked.items() if is_asked]
 
 
 def _handed_on(plan: ProgramPlan) -> list[str]:
-    """The names of the quantities that per-pixel shading passes from the vertex to the fragment stage."""
+    """Returns the names of the quantities that per-pixel shading passes from the vertex to the fragment stage."""
     names = _wanted(plan)
     return names + [name for name in _wanted_by_alpha(plan) if name not in names]
 
 
 def _varyings(names: list[str], direction: str) -> Code:
-    """The declarations of quantities that pass from the vertex to the fragment stage; direction is "in" or "out".
+    """Returns the declarations of quantities that pass from the vertex to the fragment stage; direction is "in" or "out".
 
     They are interpolated at the centroid of the covered samples. With several samples per pixel, the centre of a pixel at a
     silhouette may lie outside the triangle, and attributes extrapolated to it give negative light or stray highlights.
@@ -222,7 +222,7 @@ def _material(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
 
 
 def _parameter(plan: ProgramPlan, name: str, use: str, at: _Interpolated | _AtVertex, bound: set[str], code: Code) -> str:
-    """The expression of a parameter that has a uniform or a texture.
+    """Returns the expression of a parameter that has a uniform or a texture.
 
     plan: the plan of the program.
     name: the parameter.
@@ -249,13 +249,13 @@ def _parameter(plan: ProgramPlan, name: str, use: str, at: _Interpolated | _AtVe
 
 
 def _bounded(value: str, declared: Parameter) -> str:
-    """An expression clamped to a parameter's bounds, which a texture may exceed."""
+    """Returns an expression clamped to a parameter's bounds, which a texture may exceed."""
     low = repr(float(declared.low))
     return f"max({value}, {low})" if declared.high is None else f"clamp({value}, {low}, {float(declared.high)!r})"
 
 
 def bound_for_shading(plan: ProgramPlan, name: str) -> bool:
-    """Whether the shading already declares the sampler named after this parameter."""
+    """Returns whether the shading already declares the sampler named after this parameter."""
     return name in {plan.picture_of(textured) for textured in plan.textured}
 
 
@@ -290,7 +290,7 @@ def _frame(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
 
 
 def _lights(group: LightGroup) -> Code:
-    """The file of a group's type, and the group's uniforms.
+    """Returns the file of a group's type, and the group's uniforms.
 
     A group with an exact count has one uniform for each field of the lights' struct. A field that no code reads is left out.
     """
@@ -308,7 +308,7 @@ def _lights(group: LightGroup) -> Code:
 
 
 def _light(group: LightGroup) -> str:
-    """The expression of the struct of the light at index i of a group."""
+    """Returns the expression of the struct of the light at index i of a group."""
     if not group.count:
         return f"u_{group.key}[i]"
     index = "" if group.count == 1 else "[i]"
@@ -322,7 +322,7 @@ def _light(group: LightGroup) -> str:
 
 
 def _loop(group: LightGroup) -> str:
-    """The lines that add the light of a group to the colour `c`."""
+    """Returns the lines that add the light of a group to the colour `c`."""
     inner = [f"{LIGHTS.class_name(group.type)} light = {_light(group)};"]
     if group.omnidirectional:
         inner.append("c += illuminate(light, f.n) * ambient_reflectance(m);")
@@ -390,7 +390,7 @@ def _shown(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
 
 
 def _alpha_inputs(plan: ProgramPlan, direction: str) -> Code:
-    """The quantities that alpha needs in a per-vertex or per-face program.
+    """Returns the quantities that alpha needs in a per-vertex or per-face program.
 
     direction: "in" for the inputs of the fragment stage, "out" for the outputs of the vertex stage and `void interpolate()`,
     which sets them.

@@ -30,12 +30,12 @@ class Interface:
         return frozenset((*self.uniforms, *self.attributes, *self.blocks))
 
     def as_dict(self) -> dict[str, Any]:
-        """The attributes as a dictionary of JSON types."""
+        """Returns the attributes as a dictionary of JSON types."""
         return {"uniforms": self.uniforms, "attributes": self.attributes, "blocks": list(self.blocks)}
 
 
 def declared(source: Source) -> Interface:
-    """The global variables that the program's text declares, in alphabetical order."""
+    """Returns the global variables that the program's text declares, in alphabetical order."""
     uniforms = [declaration for stage in source.stages for declaration in stage.declarations("uniform")]
     blocks = {declaration.name for stage in source.stages for declaration in stage.declarations("block")}
     return Interface(_types(uniforms), _types(list(source.vertex.declarations("in"))), tuple(sorted(blocks)))

@@ -26,12 +26,14 @@ Use = Literal["uniform", "grey", "texture", "unused"]
 
 
 def is_grey(colour: tuple[float, float, float]) -> bool:
-    """Whether the three channels are equal. Such a colour is uploaded as one number, since a uniform costs llvmpipe time."""
+    """Returns whether the three channels are equal. Such a colour is uploaded as one number, since a uniform costs llvmpipe
+    time.
+    """
     return colour[0] == colour[1] == colour[2]
 
 
 def is_white(light: Light) -> bool:
-    """Whether the light's colour is grey, so that its intensity is one number."""
+    """Returns whether the light's colour is grey, so that its intensity is one number."""
     return is_grey(light.colour)
 
 
@@ -41,7 +43,9 @@ def kind(light: Light) -> tuple[str, Falloff]:
 
 
 def channel(use: str) -> str | None:
-    """The texture channel that a parameter's use names ("texture.g": "g"); "" for a colour texture, None for other uses."""
+    """Returns the texture channel that a parameter's use names ("texture.g": "g"); "" for a colour texture, None for other
+    uses.
+    """
     source, _, name = use.partition(".")
     return name if source == "texture" else None
 
@@ -73,7 +77,7 @@ class LightGroup:
         return LIGHTS[self.type].omnidirectional
 
     def holds(self, light: Light) -> bool:
-        """Whether the light belongs to the group."""
+        """Returns whether the light belongs to the group."""
         return (self.type, self.falloff) == kind(light) and (self.count == 0 or self.white == is_white(light))
 
 
@@ -173,7 +177,7 @@ class ProgramPlan:
         return bool(self.textured) or self.normal_map or self.direction_map or self.shows == "uv"
 
     def picture_of(self, name: str) -> str:
-        """The parameter under whose name the texture of `name` is bound."""
+        """Returns the parameter under whose name the texture of `name` is bound."""
         return dict(self.shared).get(name, name)
 
     @property
@@ -193,7 +197,7 @@ class ProgramPlan:
         return ", ".join([f"{model} per {PER[self.rate]}", lit_by, self.viewer, *self._extras(), self.encoding])
 
     def _extras(self) -> list[str]:
-        """The optional features of the program, in words."""
+        """Returns the optional features of the program, in words."""
         channels = {name: channel(use) for name, use in self.parameters}
         textures = [f"{name} textured" + (f" ({channels[name]})" if channels[name] else "") for name in self.textured]
         present = {

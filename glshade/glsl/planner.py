@@ -27,7 +27,9 @@ CLOSEST = 1e-15
 
 
 def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["linear", "srgb"]) -> ProgramPlan:
-    """The plan of the program for one instance, in canonical form: features that cannot show in the picture are left out."""
+    """Returns the plan of the program for one instance, in canonical form: features that cannot show in the picture are left
+    out.
+    """
     if instance.shows != "light":
         return _bare(instance, assembly, encoding)
     material = instance.material
@@ -101,7 +103,9 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
 
 
 def _groups(lights: Iterable[Light]) -> tuple[LightGroup, ...]:
-    """The groups of the lights. At most EXACT_LIGHTS of a kind make a white and a coloured group, more make one paged group."""
+    """Returns the groups of the lights. At most EXACT_LIGHTS of a kind make a white and a coloured group, more make one paged
+    group.
+    """
     kinds: dict[tuple[str, Falloff], Counter[bool]] = {}
     for light in lights:
         kinds.setdefault(kind(light), Counter())[is_white(light)] += 1
@@ -121,7 +125,9 @@ def _viewer(view: View) -> Viewer:
 
 
 def _bare(instance: Instance, assembly: Assembly, encoding: Literal["linear", "srgb"]) -> ProgramPlan:
-    """The plan of a program that shows a depth, normal or uv in place of light. It has no lights, but the same cut-outs."""
+    """Returns the plan of a program that shows a depth, normal or uv in place of light. It has no lights, but the same
+    cut-outs.
+    """
     material = instance.material
     base = material.base()
     masked = material.alpha_mode == "mask"
@@ -150,13 +156,13 @@ def _bare(instance: Instance, assembly: Assembly, encoding: Literal["linear", "s
 
 
 def with_equals(material: Brdf, asked: frozenset[str]) -> frozenset[str]:
-    """The parameters that are asked for. If one is left out, the parameter whose value it takes is included too."""
+    """Returns the parameters that are asked for. If one is left out, the parameter whose value it takes is included too."""
     declared = material.parameters()
     return asked | {declared[name].same_as or name for name in asked if getattr(material, name) is None}
 
 
 def explain(scene: Scene, shading: Rate | None = None) -> Plan:
-    """The plan of a scene: its programs, and the reason for each of their features.
+    """Returns the plan of a scene: its programs, and the reason for each of their features.
 
     scene: the scene to plan.
     shading: optional; replaces the shading rate of every object.
@@ -171,7 +177,7 @@ def explain(scene: Scene, shading: Rate | None = None) -> Plan:
 
 
 def _has_pages(instance: Instance, assembly: Assembly) -> bool:
-    """Whether the instance is lit by more lights of a kind than one draw call takes."""
+    """Returns whether the instance is lit by more lights of a kind than one draw call takes."""
     reached = (assembly.lights[i] for i in instance.lights)
     is_lit = bool(instance.material.asked("light"))
     counts = Counter(kind(light) for light in reached if not light.ignores_normal and (is_lit or light.omnidirectional))
@@ -179,7 +185,7 @@ def _has_pages(instance: Instance, assembly: Assembly) -> bool:
 
 
 def plan(assembly: Assembly, encoding: Literal["linear", "srgb"]) -> Plan:
-    """The plan of an assembled scene."""
+    """Returns the plan of an assembled scene."""
     programs: dict[ProgramPlan, int] = {}
     draws: list[tuple[str, int]] = []
     why: dict[str, str] = {}

@@ -89,7 +89,7 @@ class Shaders:
                     raise ShaderError(f"{folder / FAST / name}: is a fast form of {name}, which does not exist")
 
     def is_current(self, files: Iterable[str] | None = None) -> bool:
-        """Whether no file and no folder has changed since it was read.
+        """Returns whether no file and no folder has changed since it was read.
 
         files: optional; the paths of the files to check, as a stage's lines name them. Default: all that were read.
         """
@@ -98,7 +98,7 @@ class Shaders:
         return all(_stamp(path) == self._stamps[path] for path in (self._stamps if files is None else files))
 
     def find(self, name: str, fast: bool = False) -> ShaderFile | None:
-        """The file of a name below the folders, read now if it was not before; None where no folder has it.
+        """Returns the file of a name below the folders, read now if it was not before; None where no folder has it.
 
         name: for example "math/unit.glsl".
         fast: whether to prefer the fast form.
@@ -119,7 +119,7 @@ class Shaders:
             raise ShaderError(f"{path}: is a symbolic link that leads out of {folder}, so it is not read")
 
     def _candidates(self, name: str, fast: bool) -> Iterator[Path]:
-        """The paths where a file may lie, in the order of preference."""
+        """Yields the paths where a file may lie, in the order of preference."""
         place = PurePosixPath(name)
         if place.is_absolute() or ".." in place.parts:
             return
@@ -164,7 +164,7 @@ _current: dict[tuple[Path, ...], Shaders] = {}
 
 
 def current(folders: Iterable[str | Path] = ()) -> Shaders:
-    """The shader files of folders as they are now; the same object as in the last call if nothing has changed.
+    """Returns the shader files of folders as they are now; the same object as in the last call if nothing has changed.
 
     Files brdf/NAME.glsl that replace no shipped file become reflectance models.
     folders: the user's shader folders, which come before the shipped one.
@@ -179,7 +179,7 @@ def current(folders: Iterable[str | Path] = ()) -> Shaders:
 
 
 def expand(name: str, generated: Mapping[str, Code | str], shaders: Shaders | None = None, fast: bool = False) -> Stage:
-    """A stage: the file `name` with all its includes in place, each once.
+    """Returns a stage: the file `name` with all its includes in place, each once.
 
     name: the name of the file below the shader folders.
     generated: place -> code for the includes in angle brackets.
@@ -202,7 +202,9 @@ class _Expansion:
         self._faults: list[str] = []
 
     def stage(self, name: str) -> Stage:
-        """The stage whose text starts with the file `name`. Errors: ShaderError with every include that cannot be resolved."""
+        """Returns the stage whose text starts with the file `name`. Errors: ShaderError with every include that cannot be
+        resolved.
+        """
         self._include(name, name)
         if self._faults:
             raise ShaderError("\n".join(self._faults))
@@ -268,7 +270,7 @@ class _Expansion:
 
 
 def _declaration(line: str) -> Declaration | None:
-    """The global variable or uniform block that a line of a file declares; None for any other line."""
+    """Returns the global variable or uniform block that a line of a file declares; None for any other line."""
     variable = _VARIABLE.match(line)
     if variable is not None:
         storage: Storage = variable["storage"]  # type: ignore[assignment]
@@ -279,7 +281,7 @@ def _declaration(line: str) -> Declaration | None:
 
 
 def _names(folder: Path) -> list[str]:
-    """The paths of the files below a folder, relative to it, in alphabetical order."""
+    """Returns the paths of the files below a folder, relative to it, in alphabetical order."""
     return [path.relative_to(folder).as_posix() for path in sorted(folder.rglob("*")) if path.is_file()]
 
 
@@ -288,7 +290,7 @@ def _folders_below(folder: Path) -> Iterator[Path]:
 
 
 def _read(path: Path) -> ShaderFile | None:
-    """The file at a path; None if there is none. Errors: ShaderError for a file that cannot be read as text."""
+    """Returns the file at a path; None if there is none. Errors: ShaderError for a file that cannot be read as text."""
     stamp = _stamp(path)
     if stamp is None or not path.is_file():
         return None
@@ -301,7 +303,7 @@ def _read(path: Path) -> ShaderFile | None:
 
 
 def _stamp(path: str | Path) -> Stamp | None:
-    """The stamp of a file or folder; None if the path does not exist."""
+    """Returns the stamp of a file or folder; None if the path does not exist."""
     try:
         stat = os.stat(path)
     except OSError:

@@ -30,7 +30,7 @@ class Declaration:
     qualifier: str = ""
 
     def __str__(self) -> str:
-        """The declaration as a line of GLSL; for a block, its first line."""
+        """Returns the declaration as a line of GLSL; for a block, its first line."""
         if self.storage == "block":
             return f"layout(std140) uniform {self.name} {{"
         array = f"[{self.count}]" if self.count else ""
@@ -117,16 +117,18 @@ class Stage:
         return hash(self.text)
 
     def place(self, line: int) -> str:
-        """The origin of a line of the text (counted from 1), as `file:line`. Lines beyond the end count as the last one."""
+        """Returns the origin of a line of the text (counted from 1), as `file:line`. Lines beyond the end count as the last
+        one.
+        """
         file, number = self.lines[min(max(line, 1), len(self.lines)) - 1]
         return f"{file}:{number}"
 
     def declarations(self, storage: Storage) -> Iterator[Declaration]:
-        """The global variables of one storage, in the order of the text."""
+        """Returns the global variables of one storage, in the order of the text."""
         return (declaration for _, declaration in self.declared if declaration.storage == storage)
 
     def only(self, kept: list[int]) -> Stage:
-        """The stage reduced to the lines at these indices, which must ascend."""
+        """Returns the stage reduced to the lines at these indices, which must ascend."""
         text = self.text.splitlines()
         place = {line: index for index, line in enumerate(kept)}
         return Stage(

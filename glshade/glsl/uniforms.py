@@ -26,7 +26,7 @@ Values = dict[str, NDArray[np.float32]]
 
 
 def object_uniforms(plan: ProgramPlan, instance: Instance, eye: Array) -> Values:
-    """The uniforms that differ from object to object: the placement and the material.
+    """Returns the uniforms that differ from object to object: the placement and the material.
 
     plan: the plan of the program.
     instance: the object.
@@ -49,7 +49,9 @@ def object_uniforms(plan: ProgramPlan, instance: Instance, eye: Array) -> Values
 
 
 def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
-    """The uniforms of the material's parameters that the program reads. A textured parameter gives the factor of its texels."""
+    """Returns the uniforms of the material's parameters that the program reads. A textured parameter gives the factor of its
+    texels.
+    """
     values: dict[str, Any] = {}
     for name, use in plan.parameters:
         value = getattr(material, name)
@@ -82,13 +84,13 @@ def textures(plan: ProgramPlan, material: Brdf) -> dict[str, Texels]:
 
 
 def ambient_radiance(instance: Instance, assembly: Assembly, exposure: float) -> Values:
-    """The uniform with the ambient light (3,) that a surface reflects, if its ambient reflectance is constant."""
+    """Returns the uniform with the ambient light (3,) that a surface reflects, if its ambient reflectance is constant."""
     intensity = ambient_intensity(assembly, instance.lights, exposure)
     return {"u_ambient_radiance": rounded(ambient_reflectance(instance.material) * intensity)}
 
 
 def light_uniforms(plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...], exposure: float) -> Values:
-    """The uniforms of ambient light and of the groups of lights that have an exact count.
+    """Returns the uniforms of ambient light and of the groups of lights that have an exact count.
 
     plan: the plan of the program.
     assembly: the assembled scene.
@@ -111,7 +113,7 @@ def light_uniforms(plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...
 
 
 def std140(type_name: str) -> np.dtype[np.void]:
-    """The std140 layout of a light's struct: a vec3 is aligned to 16 bytes, a float to 4; the size is a multiple of 16."""
+    """Returns the std140 layout of a light's struct: a vec3 is aligned to 16 bytes, a float to 4; the size is a multiple of 16."""
     names, formats, offsets, offset = [], [], [], 0
     for name, kind in LIGHTS[type_name].fields().items():
         vector = kind == "vec3"
@@ -124,7 +126,7 @@ def std140(type_name: str) -> np.dtype[np.void]:
 
 
 def light_pages(group: LightGroup, lights: list[Light], eye: Array, exposure: float, page: int) -> list[NDArray[np.void]]:
-    """The lights of a large group as arrays of std140 records, one array per page.
+    """Returns the lights of a large group as arrays of std140 records, one array per page.
 
     group: a group of lights without an exact count.
     lights: the lights of the group.

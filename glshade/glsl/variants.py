@@ -37,12 +37,12 @@ class Variants:
     compiled: int
 
     def as_dict(self) -> dict[str, int]:
-        """The attributes as a dictionary of JSON types."""
+        """Returns the attributes as a dictionary of JSON types."""
         return dict(vars(self))
 
 
 def count_variants(scene: Scene, assembly: Assembly, plan: Plan, compiled: int) -> Variants:
-    """The numbers of programs of a scene.
+    """Returns the numbers of programs of a scene.
 
     scene: the scene whose programs are counted.
     assembly: the assembled scene.
@@ -66,19 +66,21 @@ def count_variants(scene: Scene, assembly: Assembly, plan: Plan, compiled: int) 
 
 
 def _written(scene: Scene, instance: Instance) -> Brdf:
-    """The material of an instance as the scene file gives it. A material from a mesh file is taken as it is drawn."""
+    """Returns the material of an instance as the scene file gives it. A material from a mesh file is taken as it is drawn."""
     given = scene.objects[instance.number].material
     material = scene.materials[given] if isinstance(given, str) else given
     return instance.quality.material(material) if material is not None else instance.material
 
 
 def _light_counts(kinds: int) -> int:
-    """The number of combinations of light counts. A kind of light has at most 8 white and coloured lights together, or many."""
+    """Returns the number of combinations of light counts. A kind of light has at most 8 white and coloured lights together, or
+    many.
+    """
     return int(((EXACT_LIGHTS + 1) * (EXACT_LIGHTS + 2) // 2 + 1) ** kinds)
 
 
 def _options(model: type[Brdf]) -> int:
-    """The number of combinations of the model's options."""
+    """Returns the number of combinations of the model's options."""
     return math.prod(len(get_args(model.model_fields[name].annotation)) for name in model.choices())
 
 
@@ -113,7 +115,7 @@ def _knobs(model: type[Brdf], kinds: int) -> dict[str, int]:
 
 
 def valid(model: type[Brdf], kinds: int) -> int:
-    """The number of combinations of the settings that `plan_instance` can return for a model.
+    """Returns the number of combinations of the settings that `plan_instance` can return for a model.
 
     model: the reflectance model.
     kinds: the number of kinds of light.
@@ -140,7 +142,7 @@ def valid(model: type[Brdf], kinds: int) -> int:
 
 
 def _uses(model: type[Brdf], directed: bool, ambient: str, cut: bool, carried: bool, coloured: bool) -> int:
-    """The number of ways to give the parameters that agree with the other settings.
+    """Returns the number of ways to give the parameters that agree with the other settings.
 
     model: the reflectance model.
     directed: whether any light comes from a direction.
@@ -184,7 +186,7 @@ def _uses(model: type[Brdf], directed: bool, ambient: str, cut: bool, carried: b
 
 
 def _asked(model: type[Brdf], by: Literal["light", "ambient"]) -> frozenset[str]:
-    """The parameters that a material of the model asks for if none of its lobes has weight 0."""
+    """Returns the parameters that a material of the model asks for if none of its lobes has weight 0."""
     return Brdf.asked(model.model_validate({}), by)
 
 

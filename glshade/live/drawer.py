@@ -407,7 +407,7 @@ class Refusals:
         self._harmless: set[str] = set()
 
     def holds(self, texts: set[str]) -> bool:
-        """Whether one of these texts has ended a drawer. texts: digests."""
+        """Returns whether one of these texts has ended a drawer. texts: digests."""
         return bool(texts & self._digests)
 
     def trying(self, texts: set[str]) -> _Trying:
@@ -437,7 +437,7 @@ def _texts(revision: Revision) -> set[str]:
 
 
 def _changes_model(values: Mapping[str, Any]) -> bool:
-    """Whether values that were set by hand give a material another model, or an object another material."""
+    """Returns whether values that were set by hand give a material another model, or an object another material."""
     return any(isinstance(value, Mapping) or key.endswith(".material") for key, value in values.items())
 
 

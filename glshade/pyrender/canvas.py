@@ -63,7 +63,7 @@ class Canvas:
 
     @contextmanager
     def without_colours(self) -> Iterator[None]:
-        """A context manager within which only depth is drawn."""
+        """Returns a context manager within which only depth is drawn."""
         # moderngl applies a mask only when the framebuffer is bound.
         self.target.color_mask = (False,) * 4
         self.target.use()

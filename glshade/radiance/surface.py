@@ -113,7 +113,7 @@ def material_of(draw: Draw, surface: Surface) -> SimpleNamespace:
 
 
 def _stands_for_base(draw: Draw, name: str) -> bool:
-    """Whether a parameter was left out and takes the value of the base colour."""
+    """Returns whether a parameter was left out and takes the value of the base colour."""
     declared = draw.model.parameters()
     same_as = declared[name].same_as
     return same_as is not None and declared[same_as].base and getattr(draw.instance.material, name) is None

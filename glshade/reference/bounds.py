@@ -94,13 +94,15 @@ class Bounds:
     alpha_high: Array
 
     def arithmetic(self, scale: float) -> Array:
-        """The error tau (N, 3) of the shading's arithmetic. scale: the picture's brightest value, at most 1."""
+        """Returns the error tau (N, 3) of the shading's arithmetic. scale: the picture's brightest value, at most 1."""
         flushed = TINY * (1 + MAGNIFIED * self.arriving)
         result: Array = AGAIN * self.rounding + STEPS * np.maximum(self.magnitude, scale) + flushed
         return result
 
     def interval(self, scale: float) -> tuple[Array, Array]:
-        """The allowed colours (least, largest), each (N, 4), premultiplied. scale: the picture's brightest value, at most 1."""
+        """Returns the allowed colours (least, largest), each (N, 4), premultiplied. scale: the picture's brightest value, at
+        most 1.
+        """
         tau = self.arithmetic(scale)
         low, high = self.value - self.below - tau, self.value + self.above + tau
         ends = [end * alpha[:, None] for end in (low, high) for alpha in (self.alpha_low, self.alpha_high)]
@@ -108,7 +110,7 @@ class Bounds:
         return np.column_stack([low, self.alpha_low]), np.column_stack([high, self.alpha_high])
 
     def centre(self) -> Array:
-        """The colours (N, 4) in float64, premultiplied."""
+        """Returns the colours (N, 4) in float64, premultiplied."""
         return np.column_stack([self.value * self.alpha[:, None], self.alpha])
 
     @classmethod
@@ -119,7 +121,7 @@ class Bounds:
 
 
 def alphas(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> tuple[Array, Array, Array]:
-    """Alpha before a cut-out compares it with its cutoff: (exact, least possible, largest possible value), each (N,).
+    """Returns alpha before a cut-out compares it with its cutoff: (exact, least possible, largest possible value), each (N,).
 
     inputs: the scene with its uploaded values.
     fragments: fragments of any draws in any order.
@@ -135,7 +137,7 @@ def alphas(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> 
 
 
 def fragment_bounds(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> Bounds:
-    """The limits between which a driver may show the light and the alpha of fragments.
+    """Returns the limits between which a driver may show the light and the alpha of fragments.
 
     inputs: the scene with its uploaded values.
     fragments: fragments of any draws in any order.
@@ -177,7 +179,7 @@ class _Errors:
 
 
 def _errors(draw: Draw, fragments: Fragments, surface: Surface, planes: Planes, driver: Freedom) -> _Errors:
-    """The errors of interpolated attributes.
+    """Returns the errors of interpolated attributes.
 
     draw: the instance that is drawn.
     fragments: N fragments of the draw.
@@ -209,7 +211,7 @@ def _errors(draw: Draw, fragments: Fragments, surface: Surface, planes: Planes, 
 
 
 def _vertex_errors(draw: Draw, surface: Surface, vertices: NDArray[np.intp], driver: Freedom) -> _Errors:
-    """The errors of attributes that the vertex stage computes.
+    """Returns the errors of attributes that the vertex stage computes.
 
     draw: the instance that is drawn.
     surface: the exact attributes at the vertices.
@@ -227,7 +229,7 @@ def _vertex_errors(draw: Draw, surface: Surface, vertices: NDArray[np.intp], dri
 
 
 def _positions_matter(draw: Draw) -> bool:
-    """Whether the light depends on the position of the surface."""
+    """Returns whether the light depends on the position of the surface."""
     return any("position" in lamp.values for lamp in draw.lamps) or (bool(draw.lamps) and draw.viewer is None)
 
 
@@ -389,7 +391,7 @@ def over_box(
             return np.stack(offsets), np.stack(along)
 
         def extreme(offsets: Array, along: Array, sign: float) -> Array:
-            """The offset (N, 3) at which sign times the light, summed over the channels, is largest."""
+            """Returns the offset (N, 3) at which sign times the light, summed over the channels, is largest."""
             best = (sign * along.sum(axis=2)).argmax(axis=0)
             found: Array = offsets[best, np.arange(len(best))]
             return found
@@ -407,7 +409,7 @@ def over_box(
 
 
 def _alphas(draw: Draw, surface: Surface, errors: _Errors, driver: Freedom) -> Array:
-    """Alpha (3, N): its exact value, its least possible value and its largest possible value."""
+    """Returns alpha (3, N): its exact value, its least possible value and its largest possible value."""
     value = alpha_of(draw, surface)
     others = [value]
     if draw.alpha_sampler is not None and errors.uv is not None:
@@ -432,7 +434,7 @@ def _alphas(draw: Draw, surface: Surface, errors: _Errors, driver: Freedom) -> A
 def _levels(
     draw: Draw, fragments: Fragments, surface: Surface, size: tuple[int, int], driver: Freedom
 ) -> tuple[Array, Array] | None:
-    """The least and the largest difference, each (N,), between a driver's level of detail and the exact one.
+    """Returns the least and the largest difference, each (N,), between a driver's level of detail and the exact one.
 
     The result is None if no texture is minified. The specification's formula has derivatives, but a driver may use differences
     within a square of 2 x 2 pixels in their place (OpenGL 4.6 core, 8.14.1; GLSL 4.60, 8.14.1).
@@ -467,7 +469,7 @@ def _levels(
 
 
 def _take(surface: Surface, indices: NDArray[np.intp]) -> Surface:
-    """The surface at the points with these indices."""
+    """Returns the surface at the points with these indices."""
 
     def take(value: Any) -> Any:
         if isinstance(value, tuple):
@@ -478,7 +480,7 @@ def _take(surface: Surface, indices: NDArray[np.intp]) -> Surface:
 
 
 def _moved(surface: Surface, name: str, axis: int, by: Array) -> Surface:
-    """The surface with one component (`axis`) of one attribute (`name`) changed by an array (N,)."""
+    """Returns the surface with one component (`axis`) of one attribute (`name`) changed by an array (N,)."""
     values = getattr(surface, name).copy()
     values[:, axis] += by
     return replace(surface, **{name: values})
@@ -490,7 +492,7 @@ def _spaced(low: Array, high: Array, count: int) -> list[Array]:
 
 
 def _between(samples: list[Array]) -> Array:
-    """The largest amount by which a function may exceed the largest of its evenly spaced samples.
+    """Returns the largest amount by which a function may exceed the largest of its evenly spaced samples.
 
     The amount is half of the largest second difference. A function reaches it if it has a kink halfway between two samples, for
     example where one mip level ends and the next begins. A parabola exceeds its samples by only a quarter of the amount.
@@ -501,7 +503,7 @@ def _between(samples: list[Array]) -> Array:
 
 
 def _float32(surface: Surface) -> Surface:
-    """The surface with all attributes rounded to float32."""
+    """Returns the surface with all attributes rounded to float32."""
 
     def narrow(value: Any) -> Any:
         if isinstance(value, tuple):

@@ -26,7 +26,8 @@ GUARDED = np.array([[1, 0, 0, GUARD], [-1, 0, 0, GUARD], [0, 1, 0, GUARD], [0, -
 
 
 def outside(clip: Array, planes: Array = PLANES) -> NDArray[np.uint8]:
-    """The outcodes of points in clip space, in the points' leading shape: bit i is set where a point lies outside of plane i.
+    """Returns the outcodes of points in clip space, in the points' leading shape: bit i is set where a point lies outside of
+    plane i.
 
     clip: the points (..., 4), with any leading shape.
     planes: the planes (P, 4).
@@ -40,7 +41,7 @@ def outside(clip: Array, planes: Array = PLANES) -> NDArray[np.uint8]:
 
 
 def cut(triangles: Array) -> tuple[Array, NDArray[np.intp]]:
-    """The parts of triangles (N, 3, 4) inside all planes: (convex polygons (N, 9, 4), their numbers of corners (N,)).
+    """Returns the parts of triangles (N, 3, 4) inside all planes: (convex polygons (N, 9, 4), their numbers of corners (N,)).
 
     A polygon of fewer than 9 corners repeats its last one; the corners of an empty polygon have no meaning. The algorithm is
     that of Sutherland and Hodgman 1974.
@@ -52,7 +53,7 @@ def cut(triangles: Array) -> tuple[Array, NDArray[np.intp]]:
 
 
 def _cut_by(polygons: Array, counts: NDArray[np.intp], plane: Array) -> tuple[Array, NDArray[np.intp]]:
-    """The parts of polygons (N, E, 4) inside one plane: (polygons (N, E + 1, 4), their numbers of corners (N,))."""
+    """Returns the parts of polygons (N, E, 4) inside one plane: (polygons (N, E + 1, 4), their numbers of corners (N,))."""
     number, size, _ = polygons.shape
     slot = np.arange(size)
     used = slot < counts[:, None]

@@ -54,7 +54,7 @@ class Inputs:
 
 
 def prepare(scene: Scene, shading: Rate | None = None, part: Part | None = None) -> Inputs:
-    """The values that the GPU renderer uploads for a linear picture with one sample per pixel.
+    """Returns the values that the GPU renderer uploads for a linear picture with one sample per pixel.
 
     scene: the scene to draw.
     shading: optional; replaces the shading rate of every object.

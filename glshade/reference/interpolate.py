@@ -35,7 +35,7 @@ class Weights:
 def weights(
     draw: Draw, triangle: NDArray[Any], x: NDArray[Any], y: NDArray[Any], size: tuple[int, int], derivatives: bool = True
 ) -> Weights:
-    """The weights of triangles at points of the picture.
+    """Returns the weights of triangles at points of the picture.
 
     Let p_i be a triangle's corners in homogeneous coordinates. The weights beta_i of a point q make sum(beta_i p_i)
     proportional to q. With the corners moved so that q is the origin, beta_i is the cross product of the other two corners
@@ -70,6 +70,6 @@ def weights(
 
 
 def blend(weight: Array, corners: NDArray[np.floating]) -> Array:
-    """The means (N, C) of the values (N, 3, C) at the corners of triangles, with the weights (N, 3)."""
+    """Returns the means (N, C) of the values (N, 3, C) at the corners of triangles, with the weights (N, 3)."""
     result: Array = np.einsum("ij,ijk->ik", weight, corners)
     return result

@@ -17,7 +17,7 @@ from glshade.scene.scene import Scene
 
 
 def render(scene: Scene, *, shading: Rate | None = None) -> Image:
-    """The picture of a scene, float32 and linear, with alpha if the background has it.
+    """Returns the picture of a scene, float32 and linear, with alpha if the background has it.
 
     It has one sample per pixel, whatever the film asks for.
     scene: the scene to draw.
@@ -32,7 +32,7 @@ def render(scene: Scene, *, shading: Rate | None = None) -> Image:
 def radiance(
     scene: Scene, *, shading: Rate | None = None, sampling: Sampling = AT_CENTRE, part: Part | None = None
 ) -> NDArray[Any]:
-    """The pixels (H, W, 4) of the film's window, float64, linear Rec. 709, premultiplied, row 0 at the top.
+    """Returns the pixels (H, W, 4) of the film's window, float64, linear Rec. 709, premultiplied, row 0 at the top.
 
     scene: the scene to draw.
     shading: optional; replaces the shading rate of every object.

@@ -22,7 +22,7 @@ FLAT = 4 / SUBPIXELS
 
 
 def depth_slack(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> Array:
-    """The largest difference (N,) between the driver's depth and the reference's.
+    """Returns the largest difference (N,) between the driver's depth and the reference's.
 
     The difference comes from the plane equation of the depth and from roundings of the depth itself.
     """
@@ -39,7 +39,7 @@ def depth_slack(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE
 
 
 def may_turn(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> NDArray[np.bool_]:
-    """Whether each fragment (N,) may show either side, because snapping may turn over its thin triangle."""
+    """Returns whether each fragment (N,) may show either side, because snapping may turn over its thin triangle."""
     result = np.zeros(len(fragments), dtype=np.bool_)
     for draw, indices, part in by_draw(inputs, fragments):
         if draw.instance.back_faces:
@@ -155,7 +155,7 @@ class Planes:
             self.slim[which] = parts.slimness(row[self.place[which]], self.at[which, :2], MARGIN / SUBPIXELS)
 
     def distance(self) -> Array:
-        """The distances (N, 3) of the fragments' centres from the edges' lines [pixels]. Edge i is opposite corner i."""
+        """Returns the distances (N, 3) of the fragments' centres from the edges' lines [pixels]. Edge i is opposite corner i."""
         lines = self.G[self.place]
         steepness = np.hypot(lines[..., 0], lines[..., 1])
         # An edge without a length is near everything.
@@ -174,7 +174,7 @@ class Planes:
         return result
 
     def errors(self, corners: Array, vertex: Array | float) -> Array:
-        """The errors (N, C) of interpolated attributes at the fragments.
+        """Returns the errors (N, C) of interpolated attributes at the fragments.
 
         corners: the values (T, 3, C) of the attributes at the corners.
         vertex: the errors of these values, which broadcast to (T, 3, C).
@@ -197,7 +197,7 @@ class Planes:
         return result
 
     def depth_error(self) -> Array:
-        """The errors (N,) of the depth z/w at the fragments."""
+        """Returns the errors (N,) of the depth z/w at the fragments."""
         plane = np.einsum("ti,tij->tj", self.z, self.G)[self.place]
         size = np.einsum("nj,nj->n", np.abs(plane), self.at)
         steepness = np.einsum("nj,nj->n", np.abs(plane[:, :2]), self.reach)
@@ -208,7 +208,7 @@ class Planes:
         return result
 
     def _needle(self, planes: Array, value: Array) -> Array:
-        """The errors (N, C) of attributes / w that needle-like triangles cause.
+        """Returns the errors (N, C) of attributes / w that needle-like triangles cause.
 
         The slopes of a plane equation are quotients. Their numerators and denominators are small differences in a needle-like
         triangle, and their error over the length of the triangle is its slimness times a rounding of the attribute's range.

@@ -66,18 +66,18 @@ class Fragments:
         return len(self.pixel)
 
     def take(self, which: Any) -> Fragments:
-        """The fragments that an index array or a mask selects."""
+        """Returns the fragments that an index array or a mask selects."""
         return Fragments(**{f.name: getattr(self, f.name)[which] for f in fields(self)})
 
     @classmethod
     def joined(cls, parts: Iterable[Fragments]) -> Fragments:
-        """The fragments of all parts, in the order of the parts."""
+        """Returns the fragments of all parts, in the order of the parts."""
         parts = list(parts) or [cls.none()]
         return cls(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)})
 
     @classmethod
     def none(cls) -> Fragments:
-        """An empty list of fragments."""
+        """Returns an empty list of fragments."""
         return cls(
             draw=np.empty(0, dtype=np.int32),
             triangle=np.empty(0, dtype=np.int32),
@@ -90,7 +90,7 @@ class Fragments:
 
 
 def rasterise(inputs: Inputs, margin: float = 0.0) -> Iterator[Fragments]:
-    """All fragments, including hidden ones, draw by draw, in pieces of about 100,000.
+    """Yields all fragments, including hidden ones, draw by draw, in pieces of about 100,000.
 
     inputs: the scene with its uploaded values.
     margin: 0 for the covered fragments only, MARGIN for every fragment that a driver might draw [1/256 pixel].
@@ -144,7 +144,7 @@ def resolve(inputs: Inputs, parts: Iterable[Fragments], opaque: Callable[[Fragme
 
 
 def _rasterise(draw: Draw, number: int, size: tuple[int, int], window: Box, margin: float) -> Iterator[Fragments]:
-    """The fragments of one draw.
+    """Yields the fragments of one draw.
 
     draw: the instance that is drawn.
     number: its index into Inputs.draws.
@@ -191,7 +191,7 @@ def _rasterise(draw: Draw, number: int, size: tuple[int, int], window: Box, marg
 
 
 def _snapped(points: Array, size: tuple[int, int]) -> Array:
-    """The positions (..., 2) of points in the picture, rounded to integers [1/256 pixel].
+    """Returns the positions (..., 2) of points in the picture, rounded to integers [1/256 pixel].
 
     points: points (..., 4) in clip space with w > 0, of any leading shape, which the result keeps.
     size: width and height of the whole picture [pixels].
@@ -305,7 +305,9 @@ class _Edges:
         self.owns = ~self.real | (x > 0) | ((x == 0) & (y > 0))
 
     def span(self, polygon: Indices, y: Array) -> tuple[Array, Array]:
-        """The range of x, (left, right), each (N,), in which the row y (N,) is inside its polygon (N,) or within the margin."""
+        """Returns the range of x, (left, right), each (N,), in which the row y (N,) is inside its polygon (N,) or within the
+        margin.
+        """
         x = self.x[polygon]
         rise = self.y[polygon] * (y[:, None] - self.corner_y[polygon]) + self.slack[polygon]
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -316,7 +318,7 @@ class _Edges:
         return left, right
 
     def inside(self, polygon: Indices, x: Array, y: Array) -> tuple[Flags, Flags]:
-        """(covered, partial), each (N,): the flags of each point x, y (N,) [1/256 pixel] in its polygon (N,)."""
+        """Returns (covered, partial), each (N,): the flags of each point x, y (N,) [1/256 pixel] in its polygon (N,)."""
         distance = self.x[polygon] * (x[:, None] - self.corner_x[polygon])
         distance += self.y[polygon] * (y[:, None] - self.corner_y[polygon])
         covered = np.all((distance > 0) | ((distance == 0) & self.owns[polygon]), axis=1)
@@ -342,7 +344,9 @@ def _batches(counts: Indices) -> Iterator[slice]:
 
 
 def _expanded(counts: Indices, start: int) -> tuple[Indices, Indices]:
-    """Two arrays: start + i, repeated counts[i] times for every i; and the number of each repetition, from 0 for every i."""
+    """Returns two arrays: start + i, repeated counts[i] times for every i; and the number of each repetition, from 0 for every
+    i.
+    """
     index = np.repeat(np.arange(len(counts)), counts)
     step = np.arange(len(index)) - np.repeat(np.cumsum(counts) - counts, counts)
     return index + start, step

@@ -22,7 +22,7 @@ NEAR = (MARGIN + 2) / SUBPIXELS
 
 
 def is_sealed(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> Flags:
-    """Whether each partial fragment (N,) belongs to a surface that covers its pixel's centre without a gap.
+    """Returns whether each partial fragment (N,) belongs to a surface that covers its pixel's centre without a gap.
 
     Two triangles on either side of a shared edge leave no gap there, whichever of them the driver draws. So a fragment is
     sealed if each edge near its pixel's centre has a sealed fragment of that pixel on its other side. A triangle that snapping

@@ -42,7 +42,7 @@ AT_CENTRE = Sampling()
 
 
 def shade_fragments(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) -> Array:
-    """The colours (N, 4) of fragments, linear Rec. 709 and premultiplied. Fragments of cut-outs are not discarded.
+    """Returns the colours (N, 4) of fragments, linear Rec. 709 and premultiplied. Fragments of cut-outs are not discarded.
 
     inputs: the scene with its uploaded values.
     fragments: fragments of any draws in any order.
@@ -60,7 +60,9 @@ def shade_fragments(inputs: Inputs, fragments: Fragments, sampling: Sampling = A
 
 
 def opacity(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) -> Array:
-    """The alpha (N,) of fragments from material, texture and vertex colour, before a cut-out compares it with its cutoff."""
+    """Returns the alpha (N,) of fragments from material, texture and vertex colour, before a cut-out compares it with its
+    cutoff.
+    """
     result = np.ones(len(fragments), dtype=sampling.dtype)
     for draw, indices, part in by_draw(inputs, fragments):
         if draw.alpha_mode != "opaque":
@@ -69,7 +71,7 @@ def opacity(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE
 
 
 def is_there(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE) -> NDArray[np.bool_]:
-    """Whether each fragment (N,) is kept. A fragment of a cut-out is discarded if its alpha is below the cutoff."""
+    """Returns whether each fragment (N,) is kept. A fragment of a cut-out is discarded if its alpha is below the cutoff."""
     cutoff = np.array([draw.alpha_cutoff if draw.alpha_mode == "mask" else -np.inf for draw in inputs.draws])
     kept: NDArray[np.bool_] = opacity(inputs, fragments, sampling) >= cutoff[fragments.draw].astype(sampling.dtype)
     return kept
@@ -86,7 +88,7 @@ def by_draw(inputs: Inputs, fragments: Fragments) -> Any:
 
 
 def _per_pixel(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Array:
-    """The light (N, 3) of fragments that are shaded at their samples."""
+    """Returns the light (N, 3) of fragments that are shaded at their samples."""
     surface = surface_at(draw, fragments, size, sampling)
     sides = draw.instance.back_faces
     side = np.where(fragments.front | (not sides), 1.0, -1.0).astype(sampling.dtype)
@@ -94,7 +96,7 @@ def _per_pixel(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling
 
 
 def _per_vertex(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Array:
-    """The light (N, 3) of fragments, shaded at the corners for the side that the fragment shows, and interpolated."""
+    """Returns the light (N, 3) of fragments, shaded at the corners for the side that the fragment shows, and interpolated."""
     corners = draw.triangles[fragments.triangle]
     x, y = places(fragments, size, sampling)
     weight = weights(draw, fragments.triangle, x, y, size, derivatives=False).values.astype(sampling.dtype)
@@ -110,7 +112,7 @@ def _per_vertex(draw: Draw, fragments: Fragments, size: tuple[int, int], samplin
 
 
 def _per_face(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Array:
-    """The light (N, 3) of fragments whose triangle is shaded once, at its centroid."""
+    """Returns the light (N, 3) of fragments whose triangle is shaded once, at its centroid."""
     faces, place = np.unique(fragments.triangle, return_inverse=True)
     surface = at_vertices(draw, draw.triangles[faces, 2], sampling.dtype, centroids=True)
     if draw.instance.back_faces:
@@ -124,13 +126,13 @@ _RATES = {"phong": _per_pixel, "gouraud": _per_vertex, "flat": _per_face}
 
 
 def places(fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> tuple[Array, Array]:
-    """The positions x, y (N,) of the fragments' samples in the picture [pixels]."""
+    """Returns the positions x, y (N,) of the fragments' samples in the picture [pixels]."""
     y, x = np.divmod(fragments.pixel.astype(np.intp), size[0])
     return x + 0.5 + sampling.offset[0], y + 0.5 + sampling.offset[1]
 
 
 def surface_at(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Surface:
-    """The interpolated surface attributes at the samples of fragments."""
+    """Returns the interpolated surface attributes at the samples of fragments."""
     triangle = fragments.triangle
     x, y = places(fragments, size, sampling)
     textured = bool(draw.pictures)

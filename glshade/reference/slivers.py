@@ -32,7 +32,7 @@ class Clipped:
 
     @classmethod
     def of(cls, triangles: Array, size: tuple[int, int]) -> Clipped:
-        """The clipped triangles. triangles: (T, 3, 4) in clip space. size: width and height of the picture [pixels]."""
+        """Returns the clipped triangles. triangles: (T, 3, 4) in clip space. size: width and height of the picture [pixels]."""
         polygons, counts = clip.cut(triangles)
         polygons = polygons[:, : max(int(counts.max(initial=3)), 3)]
         # A polygon that is empty has no fragments, except by the margin of coverage; its corners must only be finite.
@@ -40,7 +40,7 @@ class Clipped:
         return cls((polygons[..., :2] / polygons[..., 3:] + 1) * (0.5 * np.array(size)), counts)
 
     def slimness(self, place: NDArray[np.intp], points: Array, margin: float) -> Array:
-        """The slimness (N,) of the most needle-like triangle that a driver may draw at each point.
+        """Returns the slimness (N,) of the most needle-like triangle that a driver may draw at each point.
 
         These are all triangles of three corners of the polygon that contain the point.
         place: the index (N,) of each point's polygon.
@@ -78,6 +78,6 @@ def slimness(corners: Array) -> Array:
 
 
 def _double_area(sides: Array) -> Array:
-    """Twice the signed areas (T,) of triangles. sides: (T, 3, 2)."""
+    """Returns twice the signed areas (T,) of triangles. sides: (T, 3, 2)."""
     area: Array = sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0]
     return area

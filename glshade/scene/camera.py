@@ -35,7 +35,7 @@ def affine(matrix: Matrix4) -> Matrix4:
 
 
 def is_singular(linear: Array) -> bool:
-    """Whether a matrix (3, 3) flattens space, whatever its scale: its columns, made unit, span a volume below 1e-9."""
+    """Returns whether a matrix (3, 3) flattens space, whatever its scale: its columns, made unit, span a volume below 1e-9."""
     length = np.linalg.norm(linear, axis=0)
     return not bool(np.all(length > 0)) or abs(np.linalg.det(linear / length)) < 1e-9
 

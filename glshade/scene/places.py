@@ -22,8 +22,8 @@ _TOKEN = re.compile(
 
 
 def place_of(text: str, key: Key) -> tuple[int, int] | None:
-    """The (line, column) of a key in a TOML or JSON text, both from 1; of the nearest table or list around it if the text does
-    not have the key, and None if it has none of them.
+    """Returns the (line, column) of a key in a TOML or JSON text, both from 1; of the nearest table or list around it if the
+    text does not have the key, and None if it has none of them.
 
     text: the text of the file.
     key: the names of tables and the indices of lists, from the outside to the key itself.

@@ -21,7 +21,7 @@ _PART = re.compile(r"\[(\d+)\]|([^.\[\]]+)")
 
 
 def problems_of(error: GlshadeError) -> tuple[Problem, ...]:
-    """The problems that an error reports, each with the lines around it where they can be read."""
+    """Returns the problems that an error reports, each with the lines around it where they can be read."""
     if isinstance(error, SceneError):
         return tuple(_of_scene(line, isinstance(error, AssetError)) for line in error.problems)
     if isinstance(error, ShaderError):
@@ -30,7 +30,7 @@ def problems_of(error: GlshadeError) -> tuple[Problem, ...]:
 
 
 def _of_shader(line: str) -> Problem:
-    """A line of a ShaderError that comes from the include resolver."""
+    """Returns a line of a ShaderError that comes from the include resolver."""
     match = _IN_SHADER.fullmatch(line)
     if match is None:
         file, colon, text = line.partition(": ")
@@ -40,7 +40,7 @@ def _of_shader(line: str) -> Problem:
 
 
 def _of_scene(line: str, is_asset: bool) -> Problem:
-    """A line of a SceneError. is_asset: whether it is about a mesh or a texture alone."""
+    """Returns a line of a SceneError. is_asset: whether it is about a mesh or a texture alone."""
     file, colon, text = line.partition(": ")
     if not colon or not Path(file).suffix:
         return Problem("", None, None, line, "scene")
@@ -59,7 +59,7 @@ def _of_scene(line: str, is_asset: bool) -> Problem:
 
 
 def _lines(file: str) -> list[str]:
-    """The lines of a text file; none if it cannot be read."""
+    """Returns the lines of a text file; none if it cannot be read."""
     try:
         return read_bytes(Path(file), LARGEST_SCENE).decode("utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError, ValueError):

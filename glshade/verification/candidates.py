@@ -110,7 +110,7 @@ def find_candidates(scene: Scene, *, shading: Rate | None = None, driver: Freedo
 
 
 def _agreeing(size: int, pixel: Array, low: Array, high: Array, open_: Flags, background: Array) -> Flags:
-    """Whether all values that each pixel (size,) may have agree within their tolerance: then any of them may be shown.
+    """Returns whether all values that each pixel (size,) may have agree within their tolerance: then any of them may be shown.
 
     They agree if all their intervals together are at most twice as wide as the widest of them, in every channel. In a dense
     mesh many triangles meet in a pixel, and all have almost the same light.

@@ -58,6 +58,6 @@ def _laws(scene: Mapping[str, Any]) -> list[str]:
 
 
 def _fails(test: str) -> bool:
-    """Whether a test of the suite fails."""
+    """Returns whether a test of the suite fails."""
     with contextlib.redirect_stdout(io.StringIO()):
         return pytest.main(["-q", "-x", "-p", "no:cacheprovider", str(ROOT / test)]) == pytest.ExitCode.TESTS_FAILED

@@ -29,7 +29,7 @@ CAMERAS: dict[str, dict[str, Any]] = {
 
 
 def bumpy() -> Mesh:
-    """A sphere with hills and valleys that hide each other, and smooth normals."""
+    """Returns a sphere with hills and valleys that hide each other, and smooth normals."""
     mesh = icosphere(3)
     p = mesh.positions.astype(np.float64)
     p *= 1 + 0.18 * np.sin(5 * p[:, :1]) * np.sin(4 * p[:, 1:2] + 1) * np.sin(6 * p[:, 2:] + 2)
@@ -37,7 +37,7 @@ def bumpy() -> Mesh:
 
 
 def material(brdf: str) -> dict[str, Any]:
-    """The model with colours that are not grey and scalars that are not equal, so that none can stand for another."""
+    """Returns the model with colours that are not grey and scalars that are not equal, so that none can stand for another."""
     model, shares = BRDFS[brdf], itertools.cycle((1.0, 0.25, 0.5, 0.75, 0.4, 0.6, 0.3, 0.7))
     values: dict[str, Any] = {"brdf": brdf}
     for name, field in model.parameters().items():

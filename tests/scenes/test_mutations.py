@@ -27,14 +27,14 @@ FEW = ("detail", "falloff", "perspective-viewer")
 
 
 def sized(path: Path, width: int) -> glshade.Scene:
-    """The scene of a file with a picture of another width [pixels] and the same aspect ratio."""
+    """Returns the scene of a file with a picture of another width [pixels] and the same aspect ratio."""
     scene = glshade.load(path)
     w, h = scene.film.size
     return scene.model_copy(update={"film": scene.film.model_copy(update={"size": (width, round(h * width / w))})})
 
 
 def shown(path: Path, width: int, renderer: Renderer) -> set[str]:
-    """The names of the mutations that show in the scene. Fails where the verifier misses one of them."""
+    """Returns the names of the mutations that show in the scene. Fails where the verifier misses one of them."""
     trials = try_mutations(sized(path, width), renderer=renderer)
     missed = [f"{t.mutation.name}: changes {t.change:.1e}" for t in trials if t.shows and not t.caught]
     assert not missed, "\n".join(missed)
@@ -43,7 +43,7 @@ def shown(path: Path, width: int, renderer: Renderer) -> set[str]:
 
 @cache
 def shipped_sources() -> frozenset[Source]:
-    """The programs of the shipped scenes at every rate."""
+    """Returns the programs of the shipped scenes at every rate."""
     rates: tuple[Rate, ...] = get_args(Rate)
     scenes = [glshade.load(path) for path in SCENES if path.stem in FEW]
     plans = [plan(ready(scene, rate), "linear") for scene, rate in itertools.product(scenes, rates)]

@@ -88,7 +88,7 @@ class Drawn:
 
     @staticmethod
     def shipped(name: str) -> str:
-        """The text of a shipped model."""
+        """Returns the text of a shipped model."""
         return (SHIPPED / "brdf" / f"{name}.glsl").read_text()
 
     def write(self, name: str, text: str) -> None:
@@ -96,31 +96,31 @@ class Drawn:
         (self.shaders / "brdf" / f"{name}.glsl").write_text(text)
 
     def request(self, **more: Any) -> Load:
-        """A request to load the scene as the next revision."""
+        """Returns a request to load the scene as the next revision."""
         self.number += 1
         return Load(revision=self.number, scene=str(self.scene), shaders=(str(self.shaders),), **more)
 
     def ask(self, request: Any) -> Answer:
-        """The drawer's answer, after it has done all the work that an answer leaves."""
+        """Returns the drawer's answer, after it has done all the work that an answer leaves."""
         answer = self.drawer.answer(request)
         self.drawer.answered()
         self.drawer.idle()
         return answer
 
     def load(self, **more: Any) -> Loaded:
-        """The answer to a request to load the scene."""
+        """Returns the answer to a request to load the scene."""
         answer = self.ask(self.request(**more))
         assert isinstance(answer, Loaded)
         return answer
 
     def draw(self, still: bool = True, **view: Any) -> Frame:
-        """The picture of a view."""
+        """Returns the picture of a view."""
         answer = self.ask(Draw(view=view, still=still))
         assert isinstance(answer, Frame), answer
         return answer
 
     def pixels(self, **view: Any) -> NDArray[np.uint8]:
-        """The pixels (H, W, C) of the still picture of a view."""
+        """Returns the pixels (H, W, C) of the still picture of a view."""
         return pixels_of(self.draw(**view))
 
     def objects(self) -> dict[str, int]:
@@ -129,7 +129,7 @@ class Drawn:
 
 
 def pixels_of(frame: Frame) -> NDArray[np.uint8]:
-    """The pixels (H, W, C) of a picture."""
+    """Returns the pixels (H, W, C) of a picture."""
     return np.asarray(Pillow.open(io.BytesIO(frame.data)))
 
 
@@ -147,7 +147,7 @@ def objects(context: Context) -> dict[str, int]:
 
 @contextmanager
 def drawn(folder: Path, text: str = SCENE) -> Iterator[Drawn]:
-    """A drawer, whose context is released at the end."""
+    """Returns a drawer, whose context is released at the end."""
     made = Drawn(folder, text)
     try:
         yield made

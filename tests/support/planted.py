@@ -142,7 +142,7 @@ def family(folder: Path) -> Document:
 
 
 def linked(folder: Path) -> Document:
-    """A ball, a cube and a cone, of which a light reaches the ball alone."""
+    """Returns a ball, a cube and a cone, of which a light reaches the ball alone."""
     left, middle = ball(transform={"translate": [-1.2, 0.0, 0.0]}), cube(transform={"scale": 0.4})
     right = {"name": "cone", "shape": "cone", "transform": {"translate": [1.2, 0.0, 0.0], "scale": 0.8}, "material": SHINY}
     return document([left, middle, right], [POINT | {"only": ["ball"]}, AMBIENT])
@@ -162,7 +162,7 @@ def pictured(key: str, transform: Document = TILTED, **keys: Any) -> Callable[[P
 
 
 def minified(folder: Path) -> Document:
-    """A plane with many more texels than pixels."""
+    """Returns a plane with many more texels than pixels."""
     path = folder / "fine.png"
     Image.fromarray(np.random.default_rng(1).integers(0, 256, (256, 256, 3)).astype(np.uint8)).save(path)
     material = {"brdf": "lambert", "kd": {"texture": str(path)}}

@@ -42,7 +42,7 @@ class Asked:
         return self.status == 200 and "token" in self.target
 
     def headers(self, port: int, cookie: str) -> list[tuple[str, str]]:
-        """Returns (name, value) of the headers."""
+        """Returns the headers as pairs of a name and a value."""
         given = {"Host": self.host, "Origin": self.origin, "Cookie": self.cookie, "Authorization": self.authorization}
         pairs = []
         for name, value in given.items():

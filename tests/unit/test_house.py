@@ -40,13 +40,13 @@ def modules() -> dict[str, Path]:
 
 @cache
 def tree(module: str) -> ast.Module:
-    """The module's syntax tree."""
+    """Returns the module's syntax tree."""
     return ast.parse(modules()[module].read_text(encoding="utf-8"))
 
 
 @cache
 def imports(module: str) -> frozenset[str]:
-    """The modules of the package that a module imports; `from glshade.room import module` counts as that module."""
+    """Returns the modules of the package that a module imports; `from glshade.room import module` counts as that module."""
     found = set()
     for node in ast.walk(tree(module)):
         if isinstance(node, ast.Import):
@@ -60,7 +60,7 @@ def imports(module: str) -> frozenset[str]:
 
 
 def room(module: str) -> str:
-    """The first part of a module's name after `glshade`: its room, or its own name where it is in none."""
+    """Returns the first part of a module's name after `glshade`: its room, or its own name where it is in none."""
     return module.partition(".")[2].partition(".")[0]
 
 
@@ -69,7 +69,7 @@ def in_room(name: str) -> list[str]:
 
 
 def reached(start: list[str]) -> set[str]:
-    """The modules that these import, and those that those import, and so on; these included."""
+    """Returns the modules that these import, and those that those import, and so on; these included."""
     seen, ahead = set(start), list(start)
     while ahead:
         for module in imports(ahead.pop()) - seen:
@@ -122,7 +122,7 @@ def test_gl_and_reference_do_not_reach_each_other() -> None:
 
 
 def functions(module: str) -> Iterator[str]:
-    """The public functions of a module."""
+    """Yields the public functions of a module."""
     for node in tree(module).body:
         if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
             yield node.name
@@ -136,7 +136,7 @@ def test_no_module_has_the_name_of_a_function_of_its_own() -> None:
 
 
 def loaded(python: Any, code: str) -> set[str]:
-    """The modules that some Python code loads."""
+    """Returns the modules that some Python code loads."""
     return set(python(f"{code}; import sys; print(*sys.modules)").split())
 
 

@@ -79,7 +79,9 @@ class MeshFile:
         return self._listed[folder]
 
     def is_outside(self, path: Path) -> bool:
-        """Whether this file must not name a path, because it leads out of the folders once its symbolic links are resolved."""
+        """Returns whether this file must not name a path, because it leads out of the folders once its symbolic links are
+        resolved.
+        """
         if self.limits.allow_outside:
             return False
         try:
@@ -125,7 +127,7 @@ def short(name: str) -> str:
 
 
 def is_file(path: Path) -> bool:
-    """Whether a path leads to a regular file. A name that no file can have leads to none."""
+    """Returns whether a path leads to a regular file. A name that no file can have leads to none."""
     try:
         return path.is_file()
     except (OSError, ValueError):

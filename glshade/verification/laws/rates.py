@@ -35,7 +35,7 @@ def _premise(scene: Scene) -> Scene:
 
 
 def _is_uniform(material: Brdf) -> bool:
-    """Whether the light that a flat face shows is the same everywhere on the face."""
+    """Returns whether the light that a flat face shows is the same everywhere on the face."""
     textured = any(isinstance(getattr(material, key), Picture) for key in type(material).model_fields)
     return not (textured or material.needs_tangents or material.alpha_mode == "blend")
 

@@ -96,7 +96,7 @@ class Thing:
         return [value for value in self.material.values() if isinstance(value, Mapping)]
 
     def _both(self, mesh: Mesh) -> bool:
-        """Whether back faces are drawn."""
+        """Returns whether back faces are drawn."""
         sides = self.item.get("sides", "auto")
         sides = self.material.get("sides", "auto") if sides == "auto" else sides
         return sides == "both" or (sides == "auto" and not is_closed(mesh))
@@ -231,7 +231,7 @@ def _meet(view: View, thing: Thing, first: int, q: Array, pixel: float) -> Meeti
 
 
 def _cut(view: View, planes: Array, depths: Array, q: Array, pixel: float) -> NDArray[np.bool_]:
-    """Whether rays (N,) pass near the lines at which the near and the far plane cut triangles (M,), as an array (N, M).
+    """Returns whether rays (N,) pass near the lines at which the near and the far plane cut triangles (M,), as an array (N, M).
 
     planes: vectors (M, 3, 3) whose dot products with q are the shares of the corners.
     depths: depths (M, 3) of the corners [scene units].
@@ -323,7 +323,7 @@ def _flat_tangents(thing: Thing, triangle: Array) -> Array:
 
 
 def _minified(thing: Thing, view: View, triangle: Array, q: Array, pixel: float) -> NDArray[np.bool_]:
-    """Whether a step of one pixel leads over more than one texel of a texture (N,)."""
+    """Returns whether a step of one pixel leads over more than one texel of a texture (N,)."""
     result = np.zeros(len(q), dtype=bool)
     if not thing.pictures or thing.rate != "phong":
         return result

@@ -111,7 +111,7 @@ def with_tangents(mesh: Mesh) -> Mesh:
 
 
 def is_closed(mesh: Mesh) -> bool:
-    """Whether every edge of the mesh has one triangle on either side, and the triangles face outward."""
+    """Returns whether every edge of the mesh has one triangle on either side, and the triangles face outward."""
     place = _numbered(mesh.positions.reshape(-1, 3)).reshape(-1, 3)
     edges = [(a, b) for t in place if len(set(t)) == 3 for a, b in zip(t, np.roll(t, -1), strict=True)]
     there = set(edges)

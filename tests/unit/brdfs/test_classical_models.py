@@ -34,12 +34,12 @@ def rule(low: float, high: float, pieces: int = 24) -> tuple[Array, Array]:
 
 
 def at_normal_incidence(model: str, **parameters: Any) -> float:
-    """The albedo for v = n, of a model whose value does not depend on the azimuth then."""
+    """Returns the albedo for v = n, of a model whose value does not depend on the azimuth then."""
     return of_height(model, 1.0, **parameters)
 
 
 def of_height(model: str, height: float, **parameters: Any) -> float:
-    """The albedo for a viewer at n.v = height, of a model whose value does not depend on the azimuth then."""
+    """Returns the albedo for a viewer at n.v = height, of a model whose value does not depend on the azimuth then."""
     u, w = rule(0.0, 1.0)
     r = np.sqrt((1 - u) * (1 + u))
     l = np.stack([0.6 * r, 0.8 * r, u], axis=-1)

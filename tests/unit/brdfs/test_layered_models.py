@@ -49,7 +49,7 @@ def numbers(material: Brdf) -> Any:
 
 
 def on_gpu(include: str, expression: str, x: Any, renderer: Renderer) -> NDArray[np.float32]:
-    """The values (N,) of a GLSL expression in l.x and l.y, which are the columns of x (N, 2). include: the file that it
+    """Returns the values (N,) of a GLSL expression in l.x and l.y, which are the columns of x (N, 2). include: the file that it
     needs."""
     text = f'#include "{include}"\n\nvec3 value(vec3 l, vec3 v) {{\n    return vec3({expression} + 0.0 * v.x);\n}}\n'
     context = renderer.context
@@ -226,7 +226,7 @@ def test_a_coat_dims_what_lies_below() -> None:
 
 
 def plain(m: Any, l: Array, v: Array) -> Array:
-    """The published model times n.l, computed by plain cosines. It is exact enough for lobes that are not too narrow."""
+    """Returns the published model times n.l, computed by plain cosines. It is exact enough for lobes that are not too narrow."""
     NoL, NoV = l[:, 2], v[:, 2]
     h = (l + v) / np.linalg.norm(l + v, axis=1)[:, None]
     NoH, LoH = h[:, 2], np.sum(l * h, axis=1)

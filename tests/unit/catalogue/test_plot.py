@@ -29,7 +29,7 @@ wood = { brdf = "lambert", kd = { texture = "t.png" } }
 
 
 def make(name: str, **parameters: Any) -> Brdf:
-    """A material of the model `name`."""
+    """Returns a material of the model `name`."""
     return BRDFS[name](**parameters)
 
 
@@ -54,7 +54,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
 
 
 def written(folder: Path) -> list[str]:
-    """The names of the files in a folder that were not there before."""
+    """Returns the names of the files in a folder that were not there before."""
     return sorted(path.name for path in folder.iterdir() if path.name not in {"s.toml", "t.png"})
 
 

@@ -46,7 +46,7 @@ def run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureF
 
 
 def copied(name: str, *edits: tuple[str, str]) -> Path:
-    """A copy of a shipped file in the folder own/, with these replacements."""
+    """Returns a copy of a shipped file in the folder own/, with these replacements."""
     text = (SHIPPED / name).read_text()
     for old, new in edits:
         assert text.count(old) == 1, (name, old)

@@ -55,7 +55,7 @@ def states(result: Result) -> list[str]:
 
 
 def value(path: str) -> np.ndarray:
-    """The value of the whole picture in a file [linear]."""
+    """Returns the value of the whole picture in a file [linear]."""
     pixels = read(path)[0][..., :3]
     assert np.all(pixels == pixels[0, 0])
     return pixels[0, 0]

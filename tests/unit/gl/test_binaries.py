@@ -188,7 +188,7 @@ def stage(text: str, name: str) -> Stage:
 
 
 def source(name: str, value: str = "") -> Source:
-    """A program with one uniform of this name."""
+    """Returns a program with one uniform of this name."""
     vertex = "#version 330 core\nin vec2 a_p;\nvoid main() {\n    gl_Position = vec4(a_p, 0.0, 1.0);\n}\n"
     fragment = f"#version 330 core\nuniform float {name};\nout vec4 o;\nvoid main() {{\n    o = vec4({value or name});\n}}\n"
     return Source(stage(vertex, "v.vert"), stage(fragment, "f.frag"))

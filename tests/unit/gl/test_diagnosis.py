@@ -40,7 +40,7 @@ def stage(text: str, name: str) -> Stage:
 
 
 def found(renderer: Renderer, fragment: str, vertex: str = VERTEX) -> list[str]:
-    """The `file:line` of each problem of a program."""
+    """Returns the `file:line` of each problem of a program."""
     problems = diagnose(renderer.context, Source(stage(vertex, "v.vert"), stage(fragment, "f.frag")))
     return [f"{problem.file}:{problem.line}" for problem in problems]
 

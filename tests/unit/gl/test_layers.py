@@ -29,7 +29,7 @@ BALL = {"type": "sphere", "segments": 24, "rings": 12}
 
 
 def picture(folder: Path, name: str, alpha: bool = False) -> Path:
-    """A small coloured picture; with alpha, every other stripe is transparent."""
+    """Returns a small coloured picture; with alpha, every other stripe is transparent."""
     y, x = np.mgrid[0:16, 0:16]
     pixels = np.stack([40 + 13 * x, 60 + 11 * y, 128 + 0 * x, np.where(x // 4 % 2, 0, 255)], axis=2).astype(np.uint8)
     g.Image(pixels[..., : 4 if alpha else 3], "srgb").save(folder / name)
@@ -82,7 +82,9 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 def deviations(made: Layers) -> tuple[float, float]:
-    """(lobes, lights): the largest difference between the sum of the layers and the picture, relative to its largest value."""
+    """Returns (lobes, lights): the largest difference between the sum of the layers and the picture, relative to its largest
+    value.
+    """
     beauty, arrays = made.image.pixels[..., :3].astype(np.float64), made.arrays
     lights = [array for name, array in arrays.items() if name.startswith("light_")]
     lobes = arrays["diffuse"].astype(np.float64) + arrays["specular"] + arrays["background"] - beauty
@@ -92,7 +94,7 @@ def deviations(made: Layers) -> tuple[float, float]:
 
 
 def alone(scene: g.Scene) -> g.Scene:
-    """The scene reduced to its first object, which needs fewer programs."""
+    """Returns the scene reduced to its first object, which needs fewer programs."""
     return scene.model_copy(update={"objects": scene.objects[:1]})
 
 

@@ -54,7 +54,7 @@ def limited(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Renderer]
 
 
 def alive(references: list[ref[Any]]) -> int:
-    """The number of the objects that have not been freed."""
+    """Returns the number of the objects that have not been freed."""
     gc.collect()
     return sum(reference() is not None for reference in references)
 

@@ -39,7 +39,7 @@ SKY: dict[str, Any] = {"type": "ambient", "intensity": 0.2}
 
 
 def text_of(source: Source) -> str:
-    """Both stages without comments."""
+    """Returns both stages without comments."""
     assert source.fragment is not None
     return uncommented(source.vertex.text + source.fragment.text)
 
@@ -133,7 +133,7 @@ def functions(text: str) -> dict[str, str]:
 
 
 def reachable(text: str) -> set[str]:
-    """The names of the functions that main() reaches."""
+    """Returns the names of the functions that main() reaches."""
     bodies, reached, ahead = functions(text), set(), ["main"]
     while ahead:
         name = ahead.pop()
@@ -217,7 +217,7 @@ def texts(scene: Scene) -> dict[str, list[Source]]:
 
 
 def without(plan: ProgramPlan) -> Iterator[tuple[str, Source]]:
-    """(feature, the program without it) of every feature that can be removed."""
+    """Yields (feature, the program without it) of every feature that can be removed."""
     for group in plan.lights:
         yield f"light {group.key}", generate(replace(plan, lights=tuple(other for other in plan.lights if other != group)))
     for name in plan.textured:
@@ -243,7 +243,7 @@ def without(plan: ProgramPlan) -> Iterator[tuple[str, Source]]:
 
 
 def white(stage: Stage, read: re.Pattern[str]) -> Stage:
-    """The stage with a white texel in place of the one that is read."""
+    """Returns the stage with a white texel in place of the one that is read."""
     return replace(stage, text=read.sub(r"\1vec4(1.0)", stage.text))
 
 

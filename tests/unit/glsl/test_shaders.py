@@ -21,7 +21,7 @@ COSPOW = "float cospow(vec3 a, vec3 b, float p) {{\n    return {value};\n}}\n"
 
 
 def scene(material: dict[str, Any] | None = None, **more: Any) -> Scene:
-    """A plane that fills the picture, under one light of intensity 1 from above."""
+    """Returns a plane that fills the picture, under one light of intensity 1 from above."""
     camera = {"type": "orthographic", "eye": [0, 2, 0], "target": [0, 0, 0], "up": [0, 0, 1], "height": 1}
     plane = {"shape": "plane", "material": material or {"brdf": "lambert", "kd": 0.5}}
     lights = [{"type": "directional", "direction": [0, -1, 0]}]
@@ -29,7 +29,7 @@ def scene(material: dict[str, Any] | None = None, **more: Any) -> Scene:
 
 
 def shown(renderer: Renderer, scene: Scene) -> float:
-    """The one value that the whole picture has [linear]."""
+    """Returns the one value that the whole picture has [linear]."""
     pixels = renderer.render(scene, dtype="float32").pixels
     assert np.all(pixels == pixels[0, 0])
     return float(pixels[0, 0, 0])

@@ -34,7 +34,7 @@ def text(found: Source) -> str:
 
 
 def code(glsl: str) -> str:
-    """The text without comments, without the struct Frame and without the function ambient_reflectance."""
+    """Returns the text without comments, without the struct Frame and without the function ambient_reflectance."""
     glsl = re.sub(r"//.*", "", glsl)
     return re.sub(r"struct Frame \{.*?\};|vec3 ambient_reflectance\(.*?\n\}", "", glsl, flags=re.S)
 
@@ -194,7 +194,7 @@ def test_the_command_says_the_same(glshade: Any, tmp_path: Path, shaders: Path) 
 
 
 def coloured_ball() -> Mesh:
-    """A sphere with vertex colours."""
+    """Returns a sphere with vertex colours."""
     ball = Scene(objects=[{"shape": {"type": "sphere", "segments": 8, "rings": 4}}]).objects[0].shape
     assert ball is not None
     mesh = ball.mesh()

@@ -210,7 +210,7 @@ def test_empty_folders_are_an_error(tmp_path: Path) -> None:
 
 
 def known(folder: str) -> list[Any]:
-    """The pairs of a folder of ../shared/data/pairs; one skipped parameter where the folder is absent."""
+    """Returns the pairs of a folder of ../shared/data/pairs; one skipped parameter where the folder is absent."""
     found = sorted((PAIRS / folder).rglob("*-expected.png"))
     if not found:
         return [pytest.param(None, marks=pytest.mark.skip(f"../shared/data/pairs/{folder} is absent"))]

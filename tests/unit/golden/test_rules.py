@@ -20,7 +20,7 @@ def pair(reference: Any, test: Any, channels: tuple[str, ...] = RGB) -> Pair:
 
 
 def changed(picture: Any, *pixels: tuple[int, int, Any]) -> Any:
-    """A copy of the picture with other values: (row, column, value) each."""
+    """Returns a copy of the picture with other values: (row, column, value) each."""
     result = picture.copy()
     for row, column, value in pixels:
         result[row, column] = value

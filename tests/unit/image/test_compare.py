@@ -19,7 +19,7 @@ BACKGROUND = np.array([0.25, 0.5, 0.75, 1.0])
 def expected(
     pixel: list[int], centre: float = 1.0, room: float = 0.01, open_: Any = (), kind: PixelClass = PixelClass.INTERIOR
 ) -> Expected:
-    """A picture whose pixels `pixel` show `centre` to within `room`, and the background elsewhere."""
+    """Returns a picture whose pixels `pixel` show `centre` to within `room`, and the background elsewhere."""
     number = SIZE[0] * SIZE[1]
     classes = np.full(number, PixelClass.BACKGROUND, dtype=np.uint8)
     classes[pixel] = kind
@@ -114,7 +114,7 @@ def test_shapes_must_agree() -> None:
 
 
 def classified(*candidates: tuple[float, float, bool, bool]) -> tuple[Any, PixelClass, bool]:
-    """(kept, class, open) of one pixel's candidates (depth, slack, partial, sealed)."""
+    """Returns (kept, class, open) of one pixel's candidates (depth, slack, partial, sealed)."""
     depth, slack, partial, sealed = (np.array(column) for column in zip(*candidates, strict=True))
     kept, classes, open_, _ = classify(1, np.zeros(len(depth), dtype=int), depth, slack, partial, sealed)
     return kept.tolist(), PixelClass(classes[0]), bool(open_[0])

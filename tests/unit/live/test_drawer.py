@@ -158,7 +158,7 @@ def test_a_symbolic_link_out_of_the_folder_is_not_followed(live: Drawn) -> None:
 
 
 def textured(folder: Path) -> str:
-    """A scene with a mesh and two textures, one of which its material file names."""
+    """Returns a scene with a mesh and two textures, one of which its material file names."""
     corners = "v -1 -1 0\nv 1 -1 0\nv 1 1 0\nv -1 1 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
     (folder / "mesh.obj").write_text(f"mtllib mesh.mtl\n{corners}usemtl paint\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n")
     (folder / "mesh.mtl").write_text("newmtl paint\nKd 1 1 1\nmap_Kd red.png\n")

@@ -33,7 +33,7 @@ class Court:
         self.live, self.judge = live, Judge("auto", "", "")
 
     def restore(self) -> Loaded:
-        """The judge's answer after it has taken over what the drawer shows."""
+        """Returns the judge's answer after it has taken over what the drawer shows."""
         loaded = self.live.load()
         assert loaded.ok, loaded.problems
         assert loaded.snapshot is not None

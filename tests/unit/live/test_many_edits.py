@@ -26,7 +26,7 @@ STATES = range(1, 7)
 
 
 def resident() -> int:
-    """The memory of this process [bytes]."""
+    """Returns the memory of this process [bytes]."""
     gc.collect()
     return int(Path("/proc/self/statm").read_text().split()[1]) * 4096
 
@@ -49,7 +49,7 @@ class Editor:
             self.pictures[state] = live.pixels(**FROM_ABOVE)
 
     def text(self, state: int | None) -> str:
-        """The text of the shader in a state; None for a broken one."""
+        """Returns the text of the shader in a state; None for a broken one."""
         factor = "wrong" if state is None else f"{state}.0 / 6.0"
         return self.live.shipped("phong").replace("return ", f"return {factor} * ", 1)
 
@@ -89,7 +89,7 @@ class Editor:
         assert self.is_shown(state)
 
     def is_shown(self, state: int | None) -> bool:
-        """Whether the last answer and the picture are those of a state. A broken one has the picture of some good one."""
+        """Returns whether the last answer and the picture are those of a state. A broken one has the picture of some good one."""
         assert self.last.ok == (not self.last.problems)
         if self.last.ok == (state is None):
             return False

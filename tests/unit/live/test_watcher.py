@@ -27,7 +27,7 @@ Next = Callable[[], Awaitable[frozenset[Path]]]
 
 @asynccontextmanager
 async def watching(*paths: Path) -> AsyncIterator[tuple[Watcher, Next]]:
-    """A watcher of paths, and a function that waits for the next change."""
+    """Returns a watcher of paths, and a function that waits for the next change."""
     watcher = Watcher()
     watcher.watch(paths)
     told: asyncio.Queue[frozenset[Path]] = asyncio.Queue()

@@ -37,7 +37,7 @@ def rotation(seed: int) -> Array:
 
 
 def corner_sets(mesh: Mesh) -> Array:
-    """Each triangle as its corners' coordinates, in an order that does not depend on the mesh's."""
+    """Returns each triangle as its corners' coordinates, in an order that does not depend on the mesh's."""
     p = mesh.positions[mesh.triangles].reshape(len(mesh.triangles), 9)
     return p[np.lexsort(p.T)]
 

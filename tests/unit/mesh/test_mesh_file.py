@@ -69,7 +69,7 @@ def area(mesh: Mesh) -> float:
 
 
 def gltf(attributes: dict[str, Any], indices: Any = (0, 1, 2), **header: Any) -> tuple[dict[str, Any], bytes]:
-    """A glTF header with one mesh, and its buffer."""
+    """Returns a glTF header with one mesh, and its buffer."""
     sizes = {1: "SCALAR", 2: "VEC2", 3: "VEC3", 4: "VEC4"}
     kinds = {"f4": 5126, "u1": 5121, "u2": 5123, "u4": 5125}
     blob, views, accessors = b"", [], []

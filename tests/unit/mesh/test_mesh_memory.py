@@ -38,7 +38,7 @@ def paths(tmp_path: Path) -> list[Path]:
 
 
 def forgotten(paths: list[Path], *models: ref[Any]) -> bool:
-    """Whether the models are gone after another one was loaded."""
+    """Returns whether the models are gone after another one was loaded."""
     load(paths[2])
     gc.collect()
     return not any(model() for model in models)

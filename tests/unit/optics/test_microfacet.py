@@ -23,8 +23,8 @@ ROUGHNESSES = [0.1, 0.5, 0.8, 1.0]
 
 
 def slopes(ax: float, ay: float, spread: float) -> tuple[Any, Any]:
-    """Half vectors (M, 3) over the hemisphere, and the solid angle (M,) of each. spread: half of the vectors have smaller
-    slopes."""
+    """Returns half vectors (M, 3) over the hemisphere, and the solid angle (M,) of each. spread: half of the vectors have
+    smaller slopes."""
     x, weight = np.polynomial.legendre.leggauss(400)
     x, weight = (x + 1) / 2, weight / 2
     phi = (np.arange(256) + 0.5) * (2 * math.pi / 256)

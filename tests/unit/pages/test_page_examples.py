@@ -108,5 +108,5 @@ def test_contributing_names_every_room() -> None:
 
 
 def extending() -> str:
-    """The text of docs/extending.md."""
+    """Returns the text of docs/extending.md."""
     return (ROOT / "docs" / "extending.md").read_text(encoding="utf-8")

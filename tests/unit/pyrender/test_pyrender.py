@@ -35,12 +35,12 @@ class Thing:
 
 
 def texture(source: Any, wrap_s: int = 10497, wrap_t: int = 10497) -> Thing:
-    """A Texture. source: pixels (H, W) or (H, W, C). wrap_s, wrap_t: OpenGL's wrap modes; 10497 is REPEAT."""
+    """Returns a Texture. source: pixels (H, W) or (H, W, C). wrap_s, wrap_t: OpenGL's wrap modes; 10497 is REPEAT."""
     return Thing(source=np.asarray(source, dtype=np.uint8), sampler=Thing(wrapS=wrap_s, wrapT=wrap_t))
 
 
 def surface(**changes: Any) -> dict[str, Any]:
-    """The attributes that all materials have. changes: values that replace the defaults."""
+    """Returns the attributes that all materials have. changes: values that replace the defaults."""
     return {
         "name": None,
         "normalTexture": None,
@@ -56,13 +56,13 @@ def surface(**changes: Any) -> dict[str, Any]:
 
 
 def rough(**changes: Any) -> Thing:
-    """A MetallicRoughnessMaterial."""
+    """Returns a MetallicRoughnessMaterial."""
     own = {"baseColorFactor": np.ones(4), "baseColorTexture": None, "metallicFactor": 0.0, "roughnessFactor": 0.5}
     return Thing(**surface(**{**own, "metallicRoughnessTexture": None, **changes}))
 
 
 def glossy(**changes: Any) -> Thing:
-    """A SpecularGlossinessMaterial, without the property glossinessFactor, which calls itself without end in pyrender."""
+    """Returns a SpecularGlossinessMaterial, without the property glossinessFactor, which calls itself without end in pyrender."""
     own = {"diffuseFactor": np.ones(4), "diffuseTexture": None, "specularFactor": np.full(3, 0.25), "_glossinessFactor": 0.75}
     return Thing(**surface(**{**own, "specularGlossinessTexture": None, **changes}))
 
@@ -72,13 +72,13 @@ FACES = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.float32)  # pyrender keeps ind
 
 
 def square(material: Thing | None = None, **changes: Any) -> Thing:
-    """A Primitive: a square from -1 to 1 in the plane z = 0 that faces +z."""
+    """Returns a Primitive: a square from -1 to 1 in the plane z = 0 that faces +z."""
     given = {"positions": SQUARE, "indices": FACES, "normals": None, "texcoord_0": (SQUARE[:, :2] + 1) / 2, "color_0": None}
     return Thing(**{**given, "mode": 4, "poses": None, "material": material or rough(), **changes})
 
 
 def moved(x: float = 0, y: float = 0, z: float = 0, turn: Any = None) -> Any:
-    """A pose (4, 4) at (x, y, z). turn: optional rotation (3, 3)."""
+    """Returns a pose (4, 4) at (x, y, z). turn: optional rotation (3, 3)."""
     pose = np.eye(4)
     pose[:3, 3] = x, y, z
     if turn is not None:
@@ -89,18 +89,18 @@ def moved(x: float = 0, y: float = 0, z: float = 0, turn: Any = None) -> Any:
 def node(
     *primitives: Thing, pose: Any = None, visible: bool = True, name: str | None = None, mesh_name: str | None = None
 ) -> Thing:
-    """A Node with a mesh of these primitives."""
+    """Returns a Node with a mesh of these primitives."""
     pose = np.eye(4) if pose is None else pose
     return Thing(mesh=Thing(primitives=list(primitives), is_visible=visible, name=mesh_name), pose=pose, name=name)
 
 
 def perspective(yfov: float = 1.0, aspect: float | None = None, near: float = 0.1, far: float | None = 50.0) -> Thing:
-    """A PerspectiveCamera."""
+    """Returns a PerspectiveCamera."""
     return Thing(yfov=yfov, aspectRatio=aspect, znear=near, zfar=far, name=None)
 
 
 def stage(*nodes: Thing, camera: Thing | None = None, at: Any = None, **changes: Any) -> Thing:
-    """A Scene of these nodes, by default seen from (0, 0, 4)."""
+    """Returns a Scene of these nodes, by default seen from (0, 0, 4)."""
     seen_from = Thing(camera=camera or perspective(), pose=moved(z=4) if at is None else at, name=None)
     own = {"mesh_nodes": set(nodes), "main_camera_node": seen_from, "bg_color": np.ones(4), "ambient_light": np.zeros(3)}
     dark: dict[str, set[Thing]] = {f"{kind}_light_nodes": set() for kind in ("directional", "point", "spot")}
@@ -116,7 +116,7 @@ def offscreen() -> Iterator[OffscreenRenderer]:
 
 
 def the_material(primitive: Thing) -> Any:
-    """The converted material of a primitive."""
+    """Returns the converted material of a primitive."""
     return from_pyrender(stage(node(primitive))).objects[0].material
 
 
@@ -350,7 +350,7 @@ CAMERAS = {
 
 
 def middle_depth(renderer: OffscreenRenderer, scene: Thing) -> Any:
-    """The depth (H, W) at the middles of the pixels, which SEG samples."""
+    """Returns the depth (H, W) at the middles of the pixels, which SEG samples."""
     return renderer.render(scene, RenderFlags.SEG, dict.fromkeys(scene.mesh_nodes, 255))[1]
 
 

@@ -28,7 +28,9 @@ COSINES = {**BELOW, **ABOVE}
 
 
 def scene(cosine: float, rate: str) -> Scene:
-    """A triangle that faces the camera, whose vertex normals have the given cosine with the direction to the viewer, +z."""
+    """Returns a triangle that faces the camera, whose vertex normals have the given cosine with the direction to the viewer,
+    +z.
+    """
     normal = (math.sqrt(1 - cosine * cosine), 0.0, cosine)
     corners = np.array([(-9.0, -9.0, 0.0), (9.0, -9.0, 0.0), (0.0, 9.0, 0.0)])
     mesh = Mesh.build(corners, [(0, 1, 2)], np.array([normal] * 3))

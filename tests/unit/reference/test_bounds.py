@@ -30,7 +30,7 @@ def view(shape: Any, size: tuple[int, int] = (240, 180), light: Any = POINT, **t
 
 
 def width(scene: Scene) -> Any:
-    """The largest width of a channel's interval, for each candidate (N,)."""
+    """Returns the largest width of a channel's interval, for each candidate (N,)."""
     expected = find_candidates(scene).expected
     return (expected.high - expected.low).max(axis=1)
 
@@ -39,7 +39,7 @@ def width(scene: Scene) -> Any:
 
 
 def over_the_border(size: tuple[int, int] = (480, 360)) -> Scene:
-    """A cube with one corner 0.6 pixels above the picture's upper edge, where the driver's clipping makes a sliver."""
+    """Returns a cube with one corner 0.6 pixels above the picture's upper edge, where the driver's clipping makes a sliver."""
     return Scene.model_validate(
         {
             "film": {"size": size},

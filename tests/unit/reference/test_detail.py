@@ -37,7 +37,7 @@ def turned(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 
 def unexplained(scene: Scene, picture: NDArray[np.float64], rules: tuple[Rule, ...]) -> int:
-    """The number of the picture's pixels that a driver with these rules may not show."""
+    """Returns the number of the picture's pixels that a driver with these rules may not show."""
     driver = Freedom(rules=rules, level=0.01)
     return judge(picture[..., :3], find_candidates(scene, driver=driver).expected).unexplained
 

@@ -39,7 +39,7 @@ def scene(objects: Any, lights: Any, camera: Any = DOWN, size: tuple[int, int] =
 
 
 def flat_picture(triangles: Any, size: int, **more: Any) -> Scene:
-    """A scene of white triangles whose corners (T, 3, 2) are given in the picture [pixels], y pointing down."""
+    """Returns a scene of white triangles whose corners (T, 3, 2) are given in the picture [pixels], y pointing down."""
     corners = np.asarray(triangles, dtype=np.float64).reshape(-1, 2)
     p = np.stack([corners[:, 0] - size / 2, size / 2 - corners[:, 1], np.zeros(len(corners))], axis=1)
     camera = {"type": "orthographic", "eye": (0, 0, 4), "target": (0, 0, 0), "height": size, "near": 1, "far": 8}
@@ -52,7 +52,7 @@ def fragments(view: Scene, margin: float = 0.0) -> Fragments:
 
 
 def rays(width: int, height: int) -> Array:
-    """The directions (H, W, 3) of the pixels of the camera AHEAD."""
+    """Returns the directions (H, W, 3) of the pixels of the camera AHEAD."""
     x, y = np.meshgrid((np.arange(width) + 0.5) * 2 / width - 1, 1 - (np.arange(height) + 0.5) * 2 / height)
     return np.stack([x, y, -np.ones_like(x)], axis=2)
 
@@ -200,7 +200,9 @@ SHIFT = np.array([8.0, 8.0, 16.0])
 
 
 def position_coloured(corners: Any, triangles: Any) -> Mesh:
-    """A mesh with the vertex colours (x + 8, y + 8, z + 16) / 32, so that a pixel's colour tells the position that it shows."""
+    """Returns a mesh with the vertex colours (x + 8, y + 8, z + 16) / 32, so that a pixel's colour tells the position that it
+    shows.
+    """
     p = np.asarray(corners, dtype=np.float64)
     colours = np.column_stack([(p + SHIFT) / 32, np.ones(len(p))])
     return Mesh.build(p, np.asarray(triangles), colours=colours)
@@ -373,7 +375,7 @@ CLOSE = 5e-5
 
 
 def differing(renderer: Renderer, view: Scene, **options: Any) -> Array:
-    """The largest difference (H, W) of the channels between the GPU and the reference."""
+    """Returns the largest difference (H, W) of the channels between the GPU and the reference."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # Both renderers sort blended surfaces in the same approximate way.
         gpu = renderer.render(view, dtype="float32", **options).pixels.astype(np.float64)
@@ -384,7 +386,7 @@ def differing(renderer: Renderer, view: Scene, **options: Any) -> Array:
 
 
 def outside(renderer: Renderer, view: Scene, **options: Any) -> NDArray[np.bool_]:
-    """The pixels (H, W) whose difference is not explained by an error of 0.1 in the level of detail.
+    """Returns the pixels (H, W) whose difference is not explained by an error of 0.1 in the level of detail.
 
     Drivers may approximate the level (OpenGL 4.6 core, 8.14.1): llvmpipe takes differences within 2 x 2 pixels, and an
     approximate logarithm. Its measured error on planes is 0.05.
@@ -419,7 +421,7 @@ def pictures(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
 
 
 def half_open() -> Mesh:
-    """Half of a torus, a mesh whose inside is visible."""
+    """Returns half of a torus, a mesh whose inside is visible."""
     whole = torus(48, 24)
     return Mesh.build(whole.positions, whole.triangles[: len(whole.triangles) // 2], whole.normals, whole.uvs)
 

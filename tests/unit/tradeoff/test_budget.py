@@ -28,7 +28,7 @@ FEW = 6
 
 
 def scene(**more: Any) -> Scene:
-    """A scene of a glossy ball, and a matte one far behind it. more: further keys of the scene."""
+    """Returns a scene of a glossy ball, and a matte one far behind it. more: further keys of the scene."""
     objects = [
         {
             "name": "hero",
@@ -48,7 +48,7 @@ def scene(**more: Any) -> Scene:
 
 
 def error_elsewhere(scene: Scene, choice: Choice, renderer: Renderer, metric: str, count: int) -> list[float]:
-    """The errors on `count` views that the choice was not tried on, computed without the code under test."""
+    """Returns the errors on `count` views that the choice was not tried on, computed without the code under test."""
     result = []
     for view in views_around(scene, count + 1, start=1.7)[1:]:
         exact = applied(view, [EXACT] * len(scene.objects))

@@ -43,14 +43,14 @@ def small(name: str, size: tuple[int, int] = (96, 54)) -> Scene:
 
 
 def pace(scene: Scene) -> float:
-    """A made-up time of a frame for a scene's quality, which is the same on every machine [s]."""
+    """Returns a made-up time of a frame for a scene's quality, which is the same on every machine [s]."""
     quality = scene.quality
     shaded = {"flat": 1.0, "gouraud": 2.0, "phong": 4.0}[str(quality.shading)] + (quality.refine is not None)
     return 1e-3 * (shaded - 0.1 * STORES.index(str(quality.storage)))
 
 
 def by_price(exact: Scene, scenes: Any, *_: Any) -> list[Timing]:
-    """A replacement of `timed` that returns made-up times."""
+    """Returns a replacement of `timed` that returns made-up times."""
     return [Timing(t, 0.99 * t, 1.01 * t) for t in map(pace, (exact, *scenes))]
 
 
@@ -63,7 +63,7 @@ def found(renderer: Any) -> dict[str, Study]:
 
 
 def least(result: Study, **values: Any) -> Point:
-    """The most exact point whose knobs have these values."""
+    """Returns the most exact point whose knobs have these values."""
     points = [p for p in result.points if all(getattr(p.setting, knob) == value for knob, value in values.items())]
     return min(points, key=lambda p: p.total.max_abs)
 
@@ -404,7 +404,7 @@ class Reader(HTMLParser):
         self.text.setdefault(self.open[-1] if self.open else "", []).append(data)
 
     def with_class(self, name: str) -> list[dict[str, str | None]]:
-        """The attributes of all elements of a class."""
+        """Returns the attributes of all elements of a class."""
         return [a for _, a in self.elements if name in (a.get("class") or "").split()]
 
 

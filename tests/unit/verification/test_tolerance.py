@@ -32,7 +32,7 @@ WITHIN = 0.1
 
 
 def tolerance(name: str, driver: Freedom) -> tuple[float, float]:
-    """(median, largest) half-width of the intervals of the scene's interior pixels, in linear light."""
+    """Returns (median, largest) half-width of the intervals of the scene's interior pixels, in linear light."""
     scene = glshade.load(SCENES / f"{name}.toml")
     scene = scene.model_copy(update={"film": scene.film.model_copy(update={"size": SIZE})})
     expected = find_candidates(scene, driver=driver).expected

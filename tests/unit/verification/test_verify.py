@@ -22,7 +22,7 @@ SIZE = (96, 64)
 
 
 def ball(size: tuple[int, int] = SIZE, lights: Any = LIGHTS, film: Any = None, **material: Any) -> g.Scene:
-    """A scene of a sphere. material: keys that replace those of its material."""
+    """Returns a scene of a sphere. material: keys that replace those of its material."""
     material = {"brdf": "phong", "kd": (0.5, 0.4, 0.3), "ks": 0.4, "exponent": 40.0, **material}
     return g.Scene.model_validate(
         {
