@@ -43,3 +43,10 @@ def unrounded() -> Iterator[None]:
         yield
     finally:
         _precision.reset(token)
+
+
+def group_starts(values: NDArray[Any]) -> NDArray[np.intp]:
+    """Returns the indices at which a new value begins in a sorted array (N,); none for an empty array."""
+    if not len(values):
+        return np.empty(0, dtype=np.intp)
+    return np.flatnonzero(np.append(True, values[1:] != values[:-1]))

@@ -146,7 +146,9 @@ def default(schema: Mapping[str, Any], key: str) -> str:
 
 
 def table(model: type[Document], without: type[Document] | None = None) -> str:
-    """Returns the table of a class's keys. without: a base class whose keys are left out, since they have a table of their own."""
+    """Returns the table of a class's keys. without: a base class whose keys are left out, since they have a table
+    of their own.
+    """
     known = set(without.model_fields) if without else set()
     rows = []
     for key, schema in model.model_json_schema()["properties"].items():

@@ -77,7 +77,9 @@ def sources() -> Iterator[Source]:
 
 
 def driver_stages() -> Iterator[tuple[Stage, str]]:
-    """Yields the stages that measure the driver, with their suffixes: each for both versions of GLSL that they are compiled in."""
+    """Yields the stages that measure the driver, with their suffixes: each for both versions of GLSL that they are
+    compiled in.
+    """
     for path in sorted((SHIPPED / "driver").iterdir()):
         if path.suffix in (".vert", ".frag"):
             for version in ("330", "400"):

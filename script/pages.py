@@ -9,7 +9,9 @@ from glshade.files import replacing
 
 
 def table(heading: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
-    """Returns a Markdown table. Cells may hold Markdown; only their vertical bars are escaped, because these would end a cell."""
+    """Returns a Markdown table. Cells may hold Markdown; only their vertical bars are escaped, because these would
+    end a cell.
+    """
     lines = [heading, ["---"] * len(heading), *([str(cell).replace("|", "\\|") for cell in row] for row in rows)]
     return "".join(f"| {' | '.join(line)} |\n" for line in lines).replace("| --- " * len(heading), "|---" * len(heading))
 

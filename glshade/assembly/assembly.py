@@ -272,7 +272,9 @@ def _world(placed: dict[str | None, tuple[Array, str | None]], item: Object) -> 
 
 
 def _is_in_range(world: Array) -> bool:
-    """Returns whether the numbers of a transform (4, 4) are in the range whose squares and cubes fit into float64; NaN is not."""
+    """Returns whether the numbers of a transform (4, 4) are in the range whose squares and cubes fit into float64;
+    NaN is not.
+    """
     sizes = np.abs(world[:3, :3]).max(axis=0)
     return bool(np.abs(world).max() <= LARGEST_NUMBER and sizes.min() >= SMALLEST_NUMBER)
 

@@ -30,7 +30,9 @@ class Binaries:
         self.folder = self._cache.part("programs")
 
     def recall(self, key: str) -> Binary | None:
-        """Returns the binary of a key; None if no file has it, or if its file is damaged: a damaged binary may crash a driver."""
+        """Returns the binary of a key; None if no file has it, or if its file is damaged: a damaged binary may
+        crash a driver.
+        """
         path = self.path(key)
         try:
             entry = path.read_bytes()

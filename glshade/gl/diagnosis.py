@@ -213,7 +213,9 @@ class _Search:
         return False
 
     def _goes_away(self, error: Message, index: int, line: str) -> bool:
-        """Returns whether an error goes away with another line in place of the one at `index`, which then stays in its place."""
+        """Returns whether an error goes away with another line in place of the one at `index`, which then stays in
+        its place.
+        """
         old, self._lines[index] = self._lines[index], line
         if self._has(error):
             self._lines[index] = old

@@ -108,7 +108,9 @@ class Renderer:
             return self._render(scene, dtype, shading, tile)
 
     def layers(self, scene: Scene, *, dtype: DType = "float32", shading: Rate | None = None, tile: int | None = None) -> Layers:
-        """Returns the picture of a scene with the layers that its film asks for (`aovs`). Arguments and errors as for `render`."""
+        """Returns the picture of a scene with the layers that its film asks for (`aovs`). Arguments and errors as
+        for `render`.
+        """
         from glshade.gl.layers import draw_layers
 
         return draw_layers(self, scene, dtype, shading, tile)

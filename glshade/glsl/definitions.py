@@ -83,7 +83,9 @@ def _end(code: Sequence[str], at: int) -> int | None:
 
 
 def unreached(lines: Sequence[str]) -> list[Definition]:
-    """Returns the definitions that neither main() nor any uniform, input or output uses, directly or through other definitions."""
+    """Returns the definitions that neither main() nor any uniform, input or output uses, directly or through other
+    definitions.
+    """
     definitions = find_definitions(lines)
     inside = {i for definition in definitions for i in range(definition.first, definition.end)}
     declarations = uncommented("\n".join(line for i, line in enumerate(lines) if i not in inside))
@@ -110,7 +112,9 @@ def _named(code: str, known: Iterable[Definition]) -> Iterable[Definition]:
 
 
 def _arguments(code: str, opening: int) -> int:
-    """Returns the number of arguments between the bracket at index `opening` and the one that closes it; -1 if none closes it."""
+    """Returns the number of arguments between the bracket at index `opening` and the one that closes it; -1 if none
+    closes it.
+    """
     depth, count = 0, 1
     for i in range(opening, len(code)):
         depth += (code[i] == "(") - (code[i] == ")")

@@ -113,7 +113,9 @@ def light_uniforms(plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...
 
 
 def std140(type_name: str) -> np.dtype[np.void]:
-    """Returns the std140 layout of a light's struct: a vec3 is aligned to 16 bytes, a float to 4; the size is a multiple of 16."""
+    """Returns the std140 layout of a light's struct: a vec3 is aligned to 16 bytes, a float to 4; the size is a
+    multiple of 16.
+    """
     names, formats, offsets, offset = [], [], [], 0
     for name, kind in LIGHTS[type_name].fields().items():
         vector = kind == "vec3"

@@ -106,12 +106,13 @@ class Image:
         """
         path = Path(path)
         floats = format_of(path).floats
-        if floats and self.linear() is not self:
+        contents = self._contents(floats, attributes or {})
+        if floats and contents.pixels is not self.pixels:
             warnings.warn(
                 f"{path}: an 8-bit image is saved as float; render with dtype='float32' for all its digits",
                 stacklevel=2,
             )
-        write(path, self._contents(floats, attributes or {}))
+        write(path, contents)
 
     def png(self) -> bytes:
         """Returns the bytes of the PNG file that `save` writes. Errors: OSError."""

@@ -8,8 +8,7 @@ from __future__ import annotations
 import hashlib
 import io
 import os
-import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
@@ -27,7 +26,6 @@ from glshade.gl.check import problems_of_scene
 from glshade.gl.context import DriverFault
 from glshade.gl.layers import positions
 from glshade.gl.program import Program
-from glshade.gl.renderer import Renderer
 from glshade.glsl.generator import generate
 from glshade.glsl.planner import explain
 from glshade.image.file import format_of
@@ -44,13 +42,11 @@ from glshade.live.messages import (
     PNG,
     Answer,
     Draw,
-    Failed,
     Frame,
     Load,
     Loaded,
     Pick,
     Picked,
-    Request,
     Restore,
     Save,
     Saved,
@@ -59,6 +55,7 @@ from glshade.live.messages import (
 from glshade.live.revision import Copies, Revision, read
 from glshade.live.snapshot import Snapshot, restored
 from glshade.live.views import Views
+from glshade.live.worker import RenderWorker
 from glshade.problem import Problem
 from glshade.radiance.readying import ready
 from glshade.scene.models import are_stale
@@ -76,25 +73,29 @@ NOT_FINITE = (255, 0, 255)
 SNAPSHOT, COPIES, TRIED, REFUSED = "snapshot", "textures", "tried", "refused"
 
 
-class Drawer:
+class Drawer(RenderWorker):
     """Draws the revisions of one scene."""
 
     def __init__(self, backend: str, device: str, folder: str) -> None:
         """Does not open a context yet.
 
-        backend: as for Renderer.
-        device: an index of `glshade devices`, or empty for the default.
+        backend, device: as for RenderWorker.
         folder: the folder for the snapshot and the copies of textures.
         """
-        self._backend: Any = backend
-        self._device = int(device) if device else None
+        super().__init__(backend, device)
+        self.handlers = {
+            Load: self._load,
+            Restore: self._restore,
+            Draw: self._draw,
+            Save: self._save,
+            Pick: self._pick,
+        }
         self._folder = Path(folder)
         # The copies of an earlier drawer stay, because the snapshot may name them.
         self._copies = Copies(self._folder / COPIES / str(os.getpid()))
         # The last two good revisions lie in two folders, which take turns.
         self._snapshots = [Snapshot(self._folder / f"{SNAPSHOT}-{turn}") for turn in (0, 1)]
         self._refusals = Refusals(self._folder)
-        self._opened: Renderer | None = None
         self._views: Views | None = None
         self._previous: Views | None = None
         # The last revision that the snapshot on disk does not hold yet.
@@ -108,30 +109,6 @@ class Drawer:
         self._aged = False
         # The time that a whole moving picture took, or would take [s].
         self._seconds = 0.0
-
-    @property
-    def renderer(self) -> Renderer:
-        """The renderer, which opens the context at first use. Errors: ContextError."""
-        if self._opened is None:
-            self._opened = Renderer(self._backend, self._device)
-        return self._opened
-
-    def answer(self, request: Request) -> Answer:
-        """Returns the answer to a request. A fault of the user's files becomes an answer, too."""
-        handlers: dict[type[Request], Callable[[Any], Answer]] = {
-            Load: self._load,
-            Restore: self._restore,
-            Draw: self._draw,
-            Save: self._save,
-            Pick: self._pick,
-        }
-        with warnings.catch_warnings():
-            # Warnings about the scene would be printed once for each picture.
-            warnings.simplefilter("ignore")
-            try:
-                return handlers[type(request)](request)
-            except FAULTS as error:
-                return Failed(id=request.id, problems=tables(error))
 
     def answered(self) -> None:
         """Writes the snapshot of a new revision, but not before its first picture was sent."""

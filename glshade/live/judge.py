@@ -5,8 +5,6 @@ It starts from the drawer's snapshot, and draws the view itself with the same dr
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -17,14 +15,11 @@ from numpy.typing import NDArray
 
 from glshade.driver.freedom import measure_freedom
 from glshade.errors import NoReference, SceneError
-from glshade.gl.renderer import Renderer
 from glshade.image.image import Image
 from glshade.image.view import displayed
 from glshade.live.child import serve
-from glshade.live.faults import FAULTS, tables
 from glshade.live.messages import (
     Answer,
-    Failed,
     Frame,
     Heat,
     Judged,
@@ -39,6 +34,7 @@ from glshade.live.messages import (
 )
 from glshade.live.snapshot import restored
 from glshade.live.views import Views
+from glshade.live.worker import RenderWorker
 from glshade.reference.picture import render
 from glshade.scene.scene import Scene
 from glshade.verification.candidates import Candidates, find_candidates, left_out, single_sample
@@ -67,46 +63,26 @@ class Trial:
     left_out: tuple[str, ...]
 
 
-class Judge:
+class Judge(RenderWorker):
     """Judges views of one revision."""
 
     def __init__(self, backend: str, device: str, folder: str) -> None:
-        """Does not open a context yet. The arguments are those of the drawer."""
-        self._backend: Any = backend
-        self._device = int(device) if device else None
-        self._opened: Renderer | None = None
-        self._views: Views | None = None
-        # The last view that was judged, because a probe or a heat map of the same view often follows.
-        self._last: tuple[Scene, str | None, Trial] | None = None
+        """Does not open a context yet.
 
-    @property
-    def renderer(self) -> Renderer:
-        """The renderer, which opens the context at first use. Errors: ContextError."""
-        if self._opened is None:
-            self._opened = Renderer(self._backend, self._device)
-        return self._opened
-
-    def answer(self, request: Request) -> Answer:
-        """Returns the answer to a request."""
-        handlers: dict[type[Request], Callable[[Any], Answer]] = {
+        backend, device: as for RenderWorker.
+        folder: not used; the drawer takes the same arguments.
+        """
+        super().__init__(backend, device)
+        self.handlers = {
             Restore: self._restore,
             Verify: self._verify,
             Probe: self._probe,
             Reference: self._reference,
             Heat: self._heat,
         }
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            try:
-                return handlers[type(request)](request)
-            except FAULTS as error:
-                return Failed(id=request.id, problems=tables(error))
-
-    def answered(self) -> None:
-        """Has nothing left to do after an answer."""
-
-    def idle(self) -> None:
-        """Has nothing to do while it waits."""
+        self._views: Views | None = None
+        # The last view that was judged, because a probe or a heat map of the same view often follows.
+        self._last: tuple[Scene, str | None, Trial] | None = None
 
     def _restore(self, request: Restore) -> Answer:
         revision = restored(Path(request.folder))

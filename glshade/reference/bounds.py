@@ -379,33 +379,52 @@ def over_box(
         curved |= np.linalg.norm(toward, axis=1) < CLOSE * error.max(axis=1)
     bent = np.flatnonzero(curved)
     if len(bent):
-        points, half = _take(surface, bent), error[bent]
-
-        def sample(centre: Array, direction: Array) -> tuple[Array, Array]:
-            """Samples the line from centre - direction to centre + direction: (offsets, light), (LEVELS, N, 3) each."""
-            offsets = _spaced(centre - direction, centre + direction, LEVELS)
-            along = [evaluate(draw, moved(points, offset)) for offset in offsets]
-            margin = _between(along)
-            low[bent] = np.minimum(low[bent], np.minimum.reduce(along) - margin)
-            high[bent] = np.maximum(high[bent], np.maximum.reduce(along) + margin)
-            return np.stack(offsets), np.stack(along)
-
-        def extreme(offsets: Array, along: Array, sign: float) -> Array:
-            """Returns the offset (N, 3) at which sign times the light, summed over the channels, is largest."""
-            best = (sign * along.sum(axis=2)).argmax(axis=0)
-            found: Array = offsets[best, np.arange(len(best))]
-            return found
-
-        lines = [sample(np.zeros_like(half), diagonal[bent]) for diagonal in diagonals]
-        lines += [sample(np.zeros_like(half), np.clip(toward[bent], -half, half)) for toward in towards]
-        offsets, along = (np.concatenate(parts) for parts in zip(*lines, strict=True))
-        # From the brightest and from the darkest of these points, lines along the axes lead to a peak or to a dip.
-        for sign in (-1.0, 1.0):
-            centre = extreme(offsets, along, sign)
-            for axis in list(range(3)) * CLIMBS:
-                line = half * (np.arange(3) == axis)
-                centre = extreme(*sample(np.where(line > 0, 0.0, centre), line), sign)
+        points = _take(surface, bent)
+        least, largest = _search(
+            lambda offset: evaluate(draw, moved(points, offset)),
+            error[bent],
+            [diagonal[bent] for diagonal in diagonals],
+            [toward[bent] for toward in towards],
+        )
+        low[bent], high[bent] = np.minimum(low[bent], least), np.maximum(high[bent], largest)
     return low, high, rounding
+
+
+def _search(light: Callable[[Array], Array], half: Array, diagonals: list[Array], towards: list[Array]) -> tuple[Array, Array]:
+    """Returns the least and the largest light, each (N, 3), that is found on lines through N boxes.
+
+    light: takes offsets (N, 3) from the middles of the boxes and returns the light (N, 3) there.
+    half: half the sides of the boxes (N, 3).
+    diagonals: the offsets (N, 3) of the boxes' corners, one for each diagonal.
+    towards: the offsets (N, 3) of the lights that may make a peak.
+    """
+    lows, highs = [], []
+
+    def sample(centre: Array, direction: Array) -> tuple[Array, Array]:
+        """Samples the line from centre - direction to centre + direction: (offsets, light), (LEVELS, N, 3) each."""
+        offsets = _spaced(centre - direction, centre + direction, LEVELS)
+        along = [light(offset) for offset in offsets]
+        margin = _between(along)
+        lows.append(np.minimum.reduce(along) - margin)
+        highs.append(np.maximum.reduce(along) + margin)
+        return np.stack(offsets), np.stack(along)
+
+    def extreme(offsets: Array, along: Array, sign: float) -> Array:
+        """Returns the offset (N, 3) at which sign times the light, summed over the channels, is largest."""
+        best = (sign * along.sum(axis=2)).argmax(axis=0)
+        found: Array = offsets[best, np.arange(len(best))]
+        return found
+
+    middle = np.zeros_like(half)
+    lines = [sample(middle, direction) for direction in (*diagonals, *(np.clip(toward, -half, half) for toward in towards))]
+    offsets, along = (np.concatenate(parts) for parts in zip(*lines, strict=True))
+    # From the brightest and from the darkest of these points, lines along the axes lead to a peak or to a dip.
+    for sign in (-1.0, 1.0):
+        centre = extreme(offsets, along, sign)
+        for axis in list(range(3)) * CLIMBS:
+            line = half * (np.arange(3) == axis)
+            centre = extreme(*sample(np.where(line > 0, 0.0, centre), line), sign)
+    return np.minimum.reduce(lows), np.maximum.reduce(highs)
 
 
 def _alphas(draw: Draw, surface: Surface, errors: _Errors, driver: Freedom) -> Array:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.arrays import group_starts
 from glshade.assembly.part import Part
 from glshade.image.image import Image
 from glshade.reference.inputs import prepare
@@ -48,7 +49,7 @@ def radiance(
     over = shade_fragments(inputs, layers, sampling)
     # The n-th blended fragments of all pixels are blended at once, by the operator "over" (Porter and Duff 1984): a fragment of
     # premultiplied colour C changes a pixel of colour D to C + (1 - alpha) D.
-    start = np.flatnonzero(np.append(True, layers.pixel[1:] != layers.pixel[:-1])) if len(layers) else np.empty(0, int)
+    start = group_starts(layers.pixel)
     order = np.arange(len(layers)) - np.repeat(start, np.diff(np.append(start, len(layers))))
     for number in range(int(order.max(initial=-1)) + 1):
         selected = np.flatnonzero(order == number)

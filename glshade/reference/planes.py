@@ -155,7 +155,9 @@ class Planes:
             self.slim[which] = parts.slimness(row[self.place[which]], self.at[which, :2], MARGIN / SUBPIXELS)
 
     def distance(self) -> Array:
-        """Returns the distances (N, 3) of the fragments' centres from the edges' lines [pixels]. Edge i is opposite corner i."""
+        """Returns the distances (N, 3) of the fragments' centres from the edges' lines [pixels]. Edge i is opposite
+        corner i.
+        """
         lines = self.G[self.place]
         steepness = np.hypot(lines[..., 0], lines[..., 1])
         # An edge without a length is near everything.
@@ -179,7 +181,8 @@ class Planes:
         corners: the values (T, 3, C) of the attributes at the corners.
         vertex: the errors of these values, which broadcast to (T, 3, C).
         """
-        planes = np.einsum("tic,tij->tcj", corners, self.G)[self.place]
+        by_triangle = np.einsum("tic,tij->tcj", corners, self.G)
+        planes = by_triangle[self.place]
         w = self.w[:, None]
         value = w * np.einsum("ncj,nj->nc", planes, self.at)
         size = np.einsum("ncj,nj->nc", np.abs(planes), self.at)
@@ -187,7 +190,7 @@ class Planes:
         slope = np.abs(planes[..., :2] - value[..., None] * self.B[:, None, :2])
         error += np.abs(w) * np.einsum("ncj,nj->nc", slope, self.reach) + 2 * U * np.abs(value)
         weight = np.abs(w * np.einsum("nij,nj->ni", self.G[self.place], self.at))
-        needle = self._needle(np.einsum("tic,tij->tcj", corners, self.G), value)
+        needle = self._needle(by_triangle, value)
         # Errors at the corners are interpolated as the attribute is. Beyond the triangle they are extrapolated, as slopes are.
         error += np.abs(w) * weight.sum(axis=1, keepdims=True) * needle
         vertex = np.broadcast_to(vertex, corners.shape)
@@ -198,11 +201,12 @@ class Planes:
 
     def depth_error(self) -> Array:
         """Returns the errors (N,) of the depth z/w at the fragments."""
-        plane = np.einsum("ti,tij->tj", self.z, self.G)[self.place]
+        by_triangle = np.einsum("ti,tij->tj", self.z, self.G)
+        plane = by_triangle[self.place]
         size = np.einsum("nj,nj->n", np.abs(plane), self.at)
         steepness = np.einsum("nj,nj->n", np.abs(plane[:, :2]), self.reach)
         depth = np.einsum("nj,nj->n", plane, self.at)
-        needle = self._needle(np.einsum("ti,tij->tj", self.z, self.G)[:, None], np.zeros((len(depth), 1)))[:, 0]
+        needle = self._needle(by_triangle[:, None], np.zeros((len(depth), 1)))[:, 0]
         corner = (self.depth_terms[:, 0] + np.abs(depth) * self.depth_terms[:, 1]) / np.abs(self.w)
         result: Array = U * (self.driver.plane * size + self.driver.window * corner) + steepness + needle
         return result

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.arrays import group_starts
 from glshade.reference.bounds import TINY, Bounds, alphas, fragment_bounds
 from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.inputs import Inputs, prepare
@@ -99,7 +100,7 @@ def find_candidates(scene: Scene, *, shading: Rate | None = None, driver: Freedo
     widest = WIDE * max(brightest, DIM * arriving, 100 * TINY)
     classes[pixel[(high - low > widest).any(axis=1)]] = PixelClass.WIDE
     picture = np.broadcast_to(inputs.background, (width * height, 4)).copy()
-    first = np.flatnonzero(np.append(True, pixel[1:] != pixel[:-1])) if len(pixel) else np.empty(0, dtype=np.intp)
+    first = group_starts(pixel)
     picture[pixel[first]] = centre[first]
     wanted = inputs.wanted.reshape(-1)
     size = inputs.window[2:]
@@ -120,7 +121,7 @@ def _agreeing(size: int, pixel: Array, low: Array, high: Array, open_: Flags, ba
     background: (4,).
     """
     agreed = np.zeros(size, dtype=np.bool_)
-    start = np.flatnonzero(np.append(True, pixel[1:] != pixel[:-1])) if len(pixel) else np.empty(0, dtype=np.intp)
+    start = group_starts(pixel)
     if len(start):
         shown = pixel[start]
         least, largest = np.minimum.reduceat(low, start), np.maximum.reduceat(high, start)
@@ -304,7 +305,7 @@ def _compose(
     """
     layer_low, layer_high = bounds.interval(scale)
     layer_centre = bounds.centre()
-    start = np.flatnonzero(np.append(True, layers.pixel[1:] != layers.pixel[:-1]))
+    start = group_starts(layers.pixel)
     level = np.arange(len(layers)) - np.repeat(start, np.diff(np.append(start, len(layers))))
     for number in range(int(level.max(initial=-1)) + 1):
         which = np.flatnonzero(level == number)

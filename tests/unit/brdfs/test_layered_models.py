@@ -226,7 +226,9 @@ def test_a_coat_dims_what_lies_below() -> None:
 
 
 def plain(m: Any, l: Array, v: Array) -> Array:
-    """Returns the published model times n.l, computed by plain cosines. It is exact enough for lobes that are not too narrow."""
+    """Returns the published model times n.l, computed by plain cosines. It is exact enough for lobes that are not
+    too narrow.
+    """
     NoL, NoV = l[:, 2], v[:, 2]
     h = (l + v) / np.linalg.norm(l + v, axis=1)[:, None]
     NoH, LoH = h[:, 2], np.sum(l * h, axis=1)

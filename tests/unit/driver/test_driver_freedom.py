@@ -16,7 +16,7 @@ from glshade.reference.freedom import LLVMPIPE, UNMEASURED, Freedom
 from glshade.reference.raster import SUBPIXELS
 
 SCENES = Path(__file__).resolve().parents[3] / "scenes"
-# What the measurements of a driver without errors would be.
+# A driver without errors would be measured like this.
 PERFECT: dict[str, Any] = {
     "subpixel_bits": {"told": 8, "measured": 8},
     "interpolation_shift_in_steps": 0.0,

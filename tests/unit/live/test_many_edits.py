@@ -89,7 +89,9 @@ class Editor:
         assert self.is_shown(state)
 
     def is_shown(self, state: int | None) -> bool:
-        """Returns whether the last answer and the picture are those of a state. A broken one has the picture of some good one."""
+        """Returns whether the last answer and the picture are those of a state. A broken one has the picture of
+        some good one.
+        """
         assert self.last.ok == (not self.last.problems)
         if self.last.ok == (state is None):
             return False

@@ -62,7 +62,9 @@ def rough(**changes: Any) -> Thing:
 
 
 def glossy(**changes: Any) -> Thing:
-    """Returns a SpecularGlossinessMaterial, without the property glossinessFactor, which calls itself without end in pyrender."""
+    """Returns a SpecularGlossinessMaterial, without the property glossinessFactor, which calls itself without end
+    in pyrender.
+    """
     own = {"diffuseFactor": np.ones(4), "diffuseTexture": None, "specularFactor": np.full(3, 0.25), "_glossinessFactor": 0.75}
     return Thing(**surface(**{**own, "specularGlossinessTexture": None, **changes}))
 
