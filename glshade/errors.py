@@ -91,7 +91,7 @@ class ShaderError(GlshadeError):
 
 
 class NoReference(GlshadeError):
-    """A model has only a GLSL file, so that nothing tells whether its pictures are right."""
+    """Nothing tells whether a picture is right: a model has only a GLSL file, or a view transform made the picture."""
 
     exit_code = 7
 

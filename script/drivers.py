@@ -111,7 +111,7 @@ def verify_with(driver: Driver, tasks: Sequence[Task], width: int) -> list[Row]:
     orders = {"backend": driver.backend, "width": width, "tasks": [asdict(task) for task in tasks]}
     done = subprocess.run(
         [sys.executable, __file__, "--orders", json.dumps(orders)],
-        env={**os.environ, **(driver.environment or {}), **(_mesa() if driver.unpacked else {})},
+        env={**os.environ, **(driver.environment or {}), **(mesa() if driver.unpacked else {})},
         stdout=subprocess.PIPE,
         text=True,
         check=False,
@@ -144,7 +144,7 @@ def _carry_out(orders: dict[str, Any]) -> None:
             print(json.dumps(asdict(row)), flush=True)
 
 
-def _mesa() -> dict[str, str]:
+def mesa() -> dict[str, str]:
     """Returns the environment variables of the unpacked Mesa. Errors: UnavailableError."""
     folder = FOLDER / "mesa-25.0"
     if not folder.exists():

@@ -15,7 +15,7 @@ import numpy as np
 from pages import table
 
 import glshade
-from glshade.verification.candidates import find_candidates, single_sample
+from glshade.verification.candidates import find_candidates, one_sample
 from glshade.verification.judgement import PixelClass
 
 SCENES = sorted((Path(__file__).resolve().parents[1] / "scenes").glob("*.toml"))
@@ -37,7 +37,7 @@ def row(path: Path, width: int) -> Sequence[str]:
     scene = glshade.load(path)
     w, h = scene.film.size
     film = scene.film.model_copy(update={"size": (width, max(1, round(h * width / w)))})
-    expected = find_candidates(single_sample(scene.model_copy(update={"film": film}))).expected
+    expected = find_candidates(one_sample(scene.model_copy(update={"film": film}))).expected
     tolerance = np.zeros(len(expected.classes))
     np.maximum.at(tolerance, expected.pixel, 0.5 * (expected.high - expected.low).max(axis=1))
     shown = np.unique(expected.pixel)

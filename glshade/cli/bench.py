@@ -10,6 +10,7 @@ import click
 from glshade.cli._options import driver, models, shaders
 
 if TYPE_CHECKING:
+    from glshade.bench.corpus.table import Tally
     from glshade.bench.report import BenchReport
 
 # Further names that `work` takes: they stand for measurements of glshade alone.
@@ -173,3 +174,94 @@ def live(backend: Any, device: int | None, repeat: int, as_json: bool) -> None:
     click.echo(measured.driver)
     heads, *rows = measured.table()
     _table.table(heads, rows)
+
+
+@command.command()
+@click.option(
+    "--corpus", type=click.Path(path_type=Path, file_okay=False), metavar="FOLDER", help="Folder for the pairs of pictures."
+)
+@click.option("--judge", "judges", multiple=True, metavar="NAME", help="Judges only with this tool; repeatable.")
+@click.option("--count", type=click.IntRange(1), metavar="N", help="Takes only N pairs, which are chosen at random.")
+@click.option("--seed", type=click.IntRange(0), default=0, show_default=True, help="Number from which what is random follows.")
+@click.option("--speed", is_flag=True, help="Measures the time of comparisons instead.")
+@click.option("--json", "as_json", is_flag=True, help="Prints the results as one JSON object, with every pair.")
+@click.option("--markdown", "as_markdown", is_flag=True, help="Prints the tables of docs/benchmarks.md.")
+def compare(
+    corpus: Path | None, judges: tuple[str, ...], count: int | None, seed: int, speed: bool, as_json: bool, as_markdown: bool
+) -> None:
+    """Measures `glshade compare` beside other tools: which regressions they find, and which noise they take for one.
+
+    The pairs are pictures of ten small scenes with faults at three strengths, and with differences that a right driver may
+    make. They are drawn into FOLDER, and what is there already is not drawn again, so that an interrupted run can go on. With
+    --speed, 1,000 pairs (or --count) are compared in a temporary folder, and only the times are told.
+    """
+    from glshade.cli import _table
+
+    if as_json and as_markdown:
+        raise click.UsageError("--json and --markdown exclude each other")
+    if speed == (corpus is not None):
+        raise click.UsageError("give either --corpus FOLDER or --speed")
+    if speed:
+        if judges:
+            raise click.UsageError("--judge chooses among the tools that judge a corpus; --speed measures glshade alone")
+        from glshade.bench.corpus.speed import PAIRS, measure_speed
+
+        measured = measure_speed(count or PAIRS)
+        if as_json:
+            _table.as_json(measured.as_dict())
+        else:
+            _print_table(*measured.table(), as_markdown=as_markdown)
+        return
+    assert corpus is not None
+    tally = _judged(corpus, judges, count, seed)
+    if as_json:
+        _table.as_json(tally.as_dict())
+        return
+    from glshade.bench.corpus.table import HEADS, listed
+
+    _print_table(HEADS, [row.cells() for row in tally.rows()], as_markdown=as_markdown)
+    for row in tally.rows():
+        click.echo(f"\n{row.title}: missed: {listed(row.missed)}\n{row.title}: false alarms: {listed(row.alarming)}")
+    if tally.inapplicable:
+        click.echo(
+            f"\n{tally.inapplicable} pairs were not made: the kind does not apply to the scene, or the driver is not there"
+        )
+
+
+def _judged(corpus: Path, names: tuple[str, ...], count: int | None, seed: int) -> Tally:
+    """Makes and judges the pairs of a corpus, with progress on stderr. Errors: click.UsageError, GlshadeError."""
+    from rich.console import Console
+    from rich.progress import track
+
+    from glshade.bench.corpus.judges import JUDGES
+    from glshade.bench.corpus.judging import available, judged
+    from glshade.bench.corpus.making import Item, planned
+    from glshade.bench.corpus.table import Tally
+    from glshade.cli import _table
+
+    def note(text: str) -> None:
+        tally.notes.append(text)
+        click.echo(f"glshade: {text}", err=True)
+
+    tally = Tally()
+    items = planned(count, seed)
+    chosen = available(_table.chosen(names, JUDGES, "judge"), note)
+    pairs = judged(corpus, items, chosen, seed, report=note)
+    # rich draws the bar on a terminal only.
+    for pair in track(pairs, "Pairs", total=len(items), console=Console(stderr=True)):
+        if isinstance(pair, Item):
+            tally.inapplicable += 1
+        else:
+            tally.judged.append(pair)
+    return tally
+
+
+def _print_table(heads: list[str], rows: list[list[str]], as_markdown: bool) -> None:
+    """Prints a table for people, or as Markdown."""
+    if not as_markdown:
+        from glshade.cli import _table
+
+        _table.table(heads, rows)
+        return
+    for cells in (heads, ["---"] * len(heads), *rows):
+        click.echo(f"| {' | '.join(cells)} |")

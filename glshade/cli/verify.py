@@ -64,7 +64,7 @@ def command(
 ) -> None:
     """Verifies a picture of SCENE.
 
-    Draws SCENE in linear values with one sample per pixel, and compares every pixel with the float64 reference.
+    Draws SCENE in linear values with the samples of its film, and compares every pixel with the float64 reference.
     The exit code is 0 if the picture is verified, 6 if it is wrong, and 7 if too many pixels are ambiguous to decide.
     """
     if table:

@@ -100,7 +100,7 @@ def _rasteriser(bits: int, shift: float) -> list[Assumption]:
             what=f"corners snap to a grid of {expected} sub-pixel bits or a finer one",
             holds=bits >= expected,
             measured=f"{bits} bits",
-            follows="edges are drawn elsewhere than in the reference, and `glshade verify` refuses to judge pictures",
+            follows="edges are drawn elsewhere than in the reference, so that `glshade verify` calls more pixels ambiguous",
         ),
         Assumption(
             what="attributes are interpolated from corners that are not snapped",

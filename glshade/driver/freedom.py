@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from glshade.driver.detail import measure_detail
 from glshade.driver.raster import measure_raster
 from glshade.errors import ContextError
 from glshade.gl.context import Context
-from glshade.reference.freedom import UNMEASURED, Freedom
+from glshade.reference.freedom import LEAST_BITS, UNMEASURED, Freedom
 from glshade.reference.raster import SUBPIXELS
 
 # The factor between the largest error that was measured and the error that is allowed. The measurement may miss the worst case.
@@ -28,13 +29,13 @@ _measured: dict[tuple[str, str, str], Freedom] = {}
 def measure_freedom(context: Context) -> Freedom:
     """Returns the Freedom of a context's driver. It is measured once in a process, which takes 70 ms on llvmpipe.
 
-    Errors: ContextError if the driver snaps corners to a grid coarser than 1/256 pixel, where the reference cannot follow.
+    Errors: ContextError if the driver snaps corners to a coarser grid than OpenGL allows.
     """
     key = (context.renderer, context.version, context.backend)
     if key not in _measured:
         with context.gl:
             found = {**measure_raster(context), **measure_detail(context)}
-        _measured[key] = freedom_of(context.renderer, found)
+        _measured[key] = replace(freedom_of(context.renderer, found), samples=context.gl.max_samples)
     return _measured[key]
 
 
@@ -43,21 +44,24 @@ def freedom_of(name: str, found: dict[str, Any]) -> Freedom:
 
     name: the name of the driver.
     found: the results of measure_raster and measure_detail.
-    Errors: ContextError if the driver snaps corners to a grid coarser than 1/256 pixel.
+    Errors: ContextError if the driver snaps corners to a coarser grid than OpenGL allows.
     """
     bits, shift = found["subpixel_bits"]["measured"], found["interpolation_shift_in_steps"]
-    if 2**bits < SUBPIXELS:
+    if bits < LEAST_BITS:
         raise ContextError(
-            f"pictures of this driver cannot be verified: it snaps corners to 1/{2**bits} pixel, and the reference to "
-            f"1/{SUBPIXELS}, so that edges differ"
+            f"pictures of this driver cannot be verified: it snaps corners to 1/{2**bits} pixel, and OpenGL demands "
+            f"1/{2**LEAST_BITS} or less"
         )
+    # A driver with a finer grid than the reference's moves corners by less than the reference does.
+    step = 1 / min(2**bits, SUBPIXELS)
     rule, error = found["level_of_detail"]["rule"], found["level_of_detail"]["error"]
     weight = found["filter_weight_error"]
     return Freedom(
         name,
-        snap=1 / SUBPIXELS if abs(shift) > SNAPPED else 0.0,
+        snap=step if abs(shift) > SNAPPED else 0.0,
         rules=UNMEASURED.rules if rule is None else (rule,),
         level=max(RESERVE * error, LEAST_LEVEL),
         texel=RESERVE * weight if weight > FLOAT_WEIGHT else 0.0,
         clips=found["clips_at_sides"] is not False,
+        subpixel_bits=bits,
     )

@@ -155,6 +155,8 @@ class _Calls:
         self.files: frozenset[str] = frozenset()
         triangles = sum(len(instance.mesh.triangles) for instance in assembly.instances)
         width, height = scene.film.size
+        # Where all samples of a pixel are at its centre, so is the centroid.
+        self._scaled = scene.film.samples > 1 and assembly.view.perspective
         self._flat = self._context.is_software and triangles * FLAT_PIXELS <= width * height
 
     def draw_calls(self, encoding: Encoding) -> Iterator[DrawCall]:
@@ -162,7 +164,7 @@ class _Calls:
         opaque: list[tuple[ProgramPlan, Instance]] = []
         blended: list[tuple[ProgramPlan, Instance]] = []
         for instance in self._assembly.instances:
-            plan = plan_instance(instance, self._assembly, encoding)
+            plan = replace(plan_instance(instance, self._assembly, encoding), scaled=self._scaled)
             (blended if plan.alpha == "blend" else opaque).append((plan, instance))
         order = {plan: index for index, (plan, _) in reversed(list(enumerate(opaque)))}
         opaque.sort(key=lambda pair: order[pair[0]])

@@ -200,7 +200,7 @@ class Renderer:
         prepared = self._prepared.get(key)
         if prepared is None or prepared.scene is not scene or not self._is_current(prepared):
             assembly = ready(scene, shading, part)
-            prepared = self._preparer.prepare(scene, assembly, encoding, self._shaders(), self.rewrite)
+            prepared = self._preparer.prepare(scene, assembly, encoding, self.current_shaders(), self.rewrite)
             self._prepared.put(key, prepared, prepared.size)
         return prepared
 
@@ -216,7 +216,7 @@ class Renderer:
         with self.context.gl:
             self.context.gl.gc()
 
-    def _shaders(self) -> Shaders:
+    def current_shaders(self) -> Shaders:
         """Returns the shader files to draw with. Errors: ShaderError."""
         return current(self._folders) if self.shaders is None else self.shaders
 
@@ -287,7 +287,7 @@ class Renderer:
         image = Image(
             pixels[..., : len(film.background)],
             film.encoding if on_gpu else "linear",
-            {} if on_gpu else self._attributes(prepared),
+            {"glshade:renderer": self._drawn_by} if on_gpu else self._attributes(prepared),
             (left, top),
             film.size if film.crop else None,
         )
@@ -384,12 +384,17 @@ class Renderer:
         self.context.gl.vertex_array(program.gl, []).render(moderngl.TRIANGLES, vertices=3)
         return picture
 
+    @property
+    def _drawn_by(self) -> str:
+        """The names of the OpenGL renderer and version, as a picture's attribute tells them."""
+        return f"{self.context.renderer}; {self.context.version}"
+
     def _attributes(self, prepared: Prepared) -> dict[str, str]:
-        """Returns the attributes of a float picture, which tell how it was made."""
+        """Returns all attributes that tell how a picture was made. Drawing 8 bits directly does not take the time for them."""
         if prepared.attributes is None:
             prepared.attributes = {
                 "glshade:version": __version__,
-                "glshade:renderer": f"{self.context.renderer}; {self.context.version}",
+                "glshade:renderer": self._drawn_by,
                 "glshade:scene": scene_digest(prepared.scene),
                 "glshade:camera": prepared.scene.camera.model_dump_json(exclude_none=True),
             }

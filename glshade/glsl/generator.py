@@ -109,9 +109,9 @@ class _Interpolated:
     """The expressions of a surface's quantities in the fragment stage, and their declarations."""
 
     def __init__(self, plan: ProgramPlan) -> None:
-        self.position, self.normal, self.tangent = "v_position", "v_normal", "v_tangent"
-        self.uv, self.colour = "v_uv", "v_colour"
-        self.declarations = _varyings(_handed_on(plan), "in")
+        self.position, self.normal, self.tangent = (_read(plan, f"v_{name}") for name in ("position", "normal", "tangent"))
+        self.uv, self.colour = "v_uv", _read(plan, "v_colour")
+        self.declarations = _varyings(plan, _handed_on(plan), "in")
 
 
 class _AtVertex:
@@ -161,15 +161,30 @@ def _handed_on(plan: ProgramPlan) -> list[str]:
     return names + [name for name in _wanted_by_alpha(plan) if name not in names]
 
 
-def _varyings(names: list[str], direction: str) -> Code:
+def _read(plan: ProgramPlan, name: str) -> str:
+    """Returns the expression of a quantity that is interpolated at the centroid, in the fragment stage."""
+    return f"({name} / v_one)" if plan.scaled else name
+
+
+def _scale(plan: ProgramPlan) -> Code:
+    """`float centroid_scale()`, the factor of all values that the fragment stage gets interpolated at the centroid."""
+    return Code().add(f"\nfloat centroid_scale() {{\n    return {'v_one' if plan.scaled else '1.0'};\n}}\n")
+
+
+def _varyings(plan: ProgramPlan, names: list[str], direction: str) -> Code:
     """Returns the declarations of quantities that pass from the vertex to the fragment stage; direction is "in" or "out".
 
     They are interpolated at the centroid of the covered samples. With several samples per pixel, the centre of a pixel at a
     silhouette may lie outside the triangle, and attributes extrapolated to it give negative light or stray highlights.
     Texture coordinates are interpolated at the pixel's centre: extrapolation does them no harm, but a shifted position would
     change the level of detail, which the driver takes from their differences between pixels.
+
+    In perspective, Mesa's llvmpipe interpolates a quantity divided by w at the centroid, and multiplies the result by w at the
+    pixel's centre. `v_one` is 1 at all vertices, and so becomes the wrong factor that all quantities have in common.
     """
     code = Code()
+    if plan.scaled:
+        (code.input if direction == "in" else code.output)("float", "v_one", "centroid")
     for name in names:
         declare = code.input if direction == "in" else code.output
         declare(TYPES[name], f"v_{name}", "" if name == "uv" else "centroid")
@@ -199,9 +214,25 @@ def _interpolated(plan: ProgramPlan) -> Code:
     for name in names:
         if name != "position":
             code.input(TYPES[name], f"a_{name}")
-    code.join(_transforms(plan)).join(_varyings(names, "out"))
+    code.join(_transforms(plan)).join(_varyings(plan, names, "out")).join(_vertex_scale(plan))
     body = "".join(f"    v_{name} = {values[name]};\n" for name in names)
-    return code.add(f"\nvoid interpolate() {{\n{body}}}\n")
+    return code.add(f"\nvoid interpolate() {{\n{body}{_one(plan)}}}\n")
+
+
+def _one(plan: ProgramPlan) -> str:
+    """Returns the statement that sets `v_one`, in the vertex stage."""
+    return "    v_one = vertex_scale();\n" if plan.scaled else ""
+
+
+def _vertex_scale(plan: ProgramPlan) -> Code:
+    """`float vertex_scale()`, which is 1, and by which the vertex stage multiplies what is interpolated at the centroid.
+
+    Drivers replace an output that is a constant or a uniform, and then it does not come with the wrong factor. So the 1 depends
+    on the vertex in a way that they cannot see through: a uniform that is never set is 0.
+    """
+    code = Code().uniform("float", "u_zero") if plan.scaled else Code()
+    value = "1.0 + u_zero * a_position.x" if plan.scaled else "1.0"
+    return code.add(f"\nfloat vertex_scale() {{\n    return {value};\n}}\n")
 
 
 def _material(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
@@ -397,15 +428,15 @@ def _alpha_inputs(plan: ProgramPlan, direction: str) -> Code:
     """
     names = _wanted_by_alpha(plan)
     if direction == "in":
-        return _varyings(names, "in")
+        return _varyings(plan, names, "in").join(_scale(plan))
     code = Code()
     declared = () if plan.rate == "flat" else _wanted(plan)
     for name in names:
         if name not in declared:
             code.input(TYPES[name], f"a_{name}")
-    code.join(_varyings(names, "out"))
+    code.join(_varyings(plan, names, "out")).join(_vertex_scale(plan))
     body = "".join(f"    v_{name} = a_{name};\n" for name in names)
-    return code.add(f"\nvoid interpolate() {{\n{body}}}\n")
+    return code.add(f"\nvoid interpolate() {{\n{body}{_one(plan)}}}\n")
 
 
 def _alpha(plan: ProgramPlan) -> Code:
@@ -418,7 +449,7 @@ def _alpha(plan: ProgramPlan) -> Code:
             code.uniform("sampler2D", f"u_{plan.alpha_from}_texture")
         value += f" * texture(u_{plan.alpha_from}_texture, v_uv).a"
     if plan.vertex_colours:
-        value += " * v_colour.a"
+        value += f" * {_read(plan, 'v_colour')}.a"
     if plan.alpha == "blend":
         return code.add(f"\nfloat alpha() {{\n    return {value};\n}}\n")
     code.uniform("float", "u_alpha_cutoff")

@@ -107,6 +107,8 @@ class ProgramPlan:
     normalise: whether interpolated normals are normalised.
     arithmetic: stable, or fast (textbook formulas in place of the numerically stable ones).
     shows: light, or the other property of the surface that is drawn in its place.
+    scaled: whether values that are interpolated at the centroid may come with a wrong factor, which the fragment stage divides
+        out.
     """
 
     rate: Rate
@@ -130,6 +132,7 @@ class ProgramPlan:
     normalise: bool = True
     arithmetic: Literal["stable", "fast"] = "stable"
     shows: Shows = "light"
+    scaled: bool = False
 
     @property
     def oriented(self) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -42,6 +43,16 @@ class Pair:
         """False where a value of either layer is infinite or NaN."""
         return all(values.dtype == np.uint8 or bool(np.isfinite(values).all()) for values in (self.reference, self.test))
 
+    @property
+    def holds_ids(self) -> bool:
+        """True for a layer of numbers of objects or materials, by the names of the layer and its channels.
+
+        These names are those with the word "id", such as object_id, those with "crypto", for Cryptomatte's layers, and the
+        channel I of a layer.
+        """
+        names = [f"{self.name}.{channel}".lower() for channel in self.channels]
+        return all("crypto" in name or "id" in re.split(r"[._: ]", name) or name[1:].endswith(".i") for name in names)
+
     @cached_property
     def changed(self) -> NDArray[np.bool_]:
         """(H, W), the pixels that differ; all of them where one layer holds 8-bit codes and the other one floats."""
@@ -74,11 +85,14 @@ class Pair:
         if not self.count:
             return Metrics()
         reference, test = self.changed_values
+        # The difference of two ids means nothing, so each pixel with another id counts as an error of 1.
+        errors = np.ones(self.count) if self.holds_ids else self.errors
+        codes = (reference, test) if self.holds_ids else (encoded(values, self.channels) for values in (reference, test))
         return Metrics(
-            worst=float(self.errors.max()),
-            rmse=float(np.sqrt(np.sum(self.errors**2) / self.size)),
-            p999=_quantile(self.errors, self.size, 0.999),
-            codes=int(np.count_nonzero(encoded(reference, self.channels) != encoded(test, self.channels))),
+            worst=float(errors.max()),
+            rmse=float(np.sqrt(np.sum(errors**2) / self.size)),
+            p999=_quantile(errors, self.size, 0.999),
+            codes=int(np.count_nonzero(np.not_equal(*codes))),
         )
 
 

@@ -12,9 +12,9 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from glshade.errors import printable
+from glshade.errors import GlshadeError, printable
 from glshade.files import replacing
-from glshade.golden.result import Metrics, Outcome, Result
+from glshade.golden.result import Cause, Metrics, Outcome, Result, SceneVerdict
 
 # GitHub shows 10 errors and 10 warnings for a step, and drops the others.
 MOST_ANNOTATIONS = 10
@@ -23,11 +23,36 @@ _NOT_IN_XML = str.maketrans(dict.fromkeys("\ufffe\uffff", "\ufffd"))
 
 
 def line(result: Result) -> str:
-    """Returns a result as one line: outcome, name, reason and the sizes of the differences."""
+    """Returns a result as one line: outcome, name, what went wrong, and the sizes of the differences."""
     metrics = largest(result)
-    parts = [printable(result.reason), _figures(metrics) if metrics and metrics.worst else ""]
+    parts = [why(result), _figures(metrics) if metrics and metrics.worst else ""]
     text = "; ".join(part for part in parts if part)
     return f"{_word(result.outcome):5}  {printable(result.name)}" + (f": {text}" if text else "")
+
+
+def why(result: Result) -> str:
+    """Returns what went wrong as one line: the scene's verdict, the causes, the reason, the distances and the notes.
+
+    It is empty where there is nothing to tell.
+    """
+    verdict = str(result.verdict) if result.verdict not in (None, SceneVerdict.SAME) else ""
+    # One approved picture has the distance that the figures tell.
+    distances = [f"{name} {rmse:.3g}" for name, rmse in result.distances.items()] if len(result.distances) > 1 else []
+    parts = [
+        f"{verdict}: {told(result.causes)}" if verdict and result.causes else verdict or told(result.causes),
+        result.reason,
+        f"distances (RMSE): {', '.join(distances)}" if distances else "",
+        *result.notes,
+    ]
+    return printable("; ".join(part for part in parts if part))
+
+
+def told(causes: Sequence[Cause]) -> str:
+    """Returns causes as one line, each with the share of the change that it explains."""
+    return "; ".join(
+        f"{cause.text} (explains {cause.explained:.0%} of the change)" if 0 < cause.explained < 1 else cause.text
+        for cause in causes
+    )
 
 
 def summary(results: Sequence[Result]) -> str:
@@ -42,7 +67,12 @@ def largest(result: Result) -> Metrics | None:
     found = [layer.metrics for layer in result.layers if layer.metrics]
     if not found:
         return None
-    return Metrics(**{name: max(getattr(metrics, name) for metrics in found) for name in asdict(found[0])})
+    values: dict[str, Any] = {}
+    for metrics in found:
+        for name, value in asdict(metrics).items():
+            if value is not None:
+                values[name] = max(values.get(name, value), value)
+    return Metrics(**values)
 
 
 def as_json(results: Sequence[Result], rule: str) -> dict[str, Any]:
@@ -54,7 +84,19 @@ def as_json(results: Sequence[Result], rule: str) -> dict[str, Any]:
             {
                 "name": printable(result.name),
                 "outcome": _word(result.outcome),
+                "verdict": None if result.verdict is None else str(result.verdict),
                 "reason": printable(result.reason),
+                "causes": [
+                    {**asdict(cause), "text": printable(cause.text), "object": printable(cause.object)}
+                    for cause in result.causes
+                ],
+                "scene": printable(result.scene) or None,
+                "drivers": {
+                    key: printable(driver) or None for key, driver in zip(("reference", "test"), result.drivers, strict=True)
+                },
+                "baseline": printable(result.baseline) or None,
+                "distances": {printable(name): rmse for name, rmse in result.distances.items()},
+                "notes": [printable(note) for note in result.notes],
                 "layers": [
                     {
                         "name": printable(layer.name),
@@ -78,7 +120,7 @@ def worst(results: Sequence[Result]) -> Outcome:
 def write_junit(path: Path, results: Sequence[Result]) -> None:
     """Writes the results as JUnit's XML, a test case for each pair.
 
-    FAIL and SIZES are failures, FILE is an error, and WARN is a test that has passed with a message. Errors: OSError.
+    FAIL and SIZES are failures, FILE is an error, and WARN is a test that has passed with a message. Errors: GlshadeError.
     """
     suite = ElementTree.Element(
         "testsuite",
@@ -93,15 +135,18 @@ def write_junit(path: Path, results: Sequence[Result]) -> None:
         case = ElementTree.SubElement(suite, "testcase", classname="glshade.compare", name=_in_xml(result.name))
         message = _in_xml(line(result))
         if result.outcome in elements:
-            element = ElementTree.SubElement(case, elements[result.outcome], message=_in_xml(result.reason))
+            element = ElementTree.SubElement(case, elements[result.outcome], message=_in_xml(why(result)))
             element.text = message
         elif result.outcome is Outcome.WARN:
             ElementTree.SubElement(case, "system-out").text = message
     root = ElementTree.Element("testsuites")
     root.append(suite)
     ElementTree.indent(root)
-    with replacing(path) as temporary:
-        ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
+    try:
+        with replacing(path) as temporary:
+            ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
+    except OSError as error:
+        raise GlshadeError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
 def github_annotations(results: Sequence[Result]) -> list[str]:
@@ -117,7 +162,7 @@ def github_annotations(results: Sequence[Result]) -> list[str]:
 def step_summary(results: Sequence[Result]) -> str:
     """Returns a page of Markdown for GitHub's step summary: the counts, and a table of the pairs that are not the same."""
     rows = [
-        f"| {_word(result.outcome)} | {_markdown(result.name)} | {_markdown(result.reason)} | {_cells(largest(result))} |\n"
+        f"| {_word(result.outcome)} | {_markdown(result.name)} | {_markdown(why(result))} | {_cells(largest(result))} |\n"
         for result in results
         if result.outcome
     ]
@@ -131,7 +176,8 @@ def _word(outcome: Outcome) -> str:
 
 def _figures(metrics: Metrics) -> str:
     """Returns the metrics as a text."""
-    return f"max {metrics.worst:.3g}, RMSE {metrics.rmse:.3g}, p99.9 {metrics.p999:.3g}, {metrics.codes} codes differ"
+    flip = "" if metrics.flip is None else f"FLIP {metrics.flip:.3g}, "
+    return f"max {metrics.worst:.3g}, RMSE {metrics.rmse:.3g}, p99.9 {metrics.p999:.3g}, {flip}{metrics.codes} codes differ"
 
 
 def _cells(metrics: Metrics | None) -> str:

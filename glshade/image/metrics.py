@@ -13,6 +13,8 @@ from glshade.image.srgb import linear_to_srgb
 Array = NDArray[Any]
 # The default of FLIP's authors: a screen 0.7 m and 3840 pixels wide, seen from 0.7 m.
 PIXELS_PER_DEGREE = 67.0
+# Larger values count as this one: the tone mapping of FLIP squares them, which must not overflow in float32.
+BRIGHTEST = 1e10
 
 
 @dataclass(frozen=True)
@@ -70,7 +72,7 @@ def errors(picture: Array, truth: Array, where: NDArray[np.bool_] | None = None,
         rmse=float(np.sqrt(np.mean(measured_errors**2))),
         p999=float(np.quantile(measured_errors, 0.999)),
         codes=float(different.mean()) if different.size else 0.0,
-        flip=_flip(np.where(measured[..., None], colours, true_colours), true_colours) if flip else 0.0,
+        flip=float(np.mean(flip_map(true_colours, np.where(measured[..., None], colours, true_colours)))) if flip else 0.0,
         non_finite=int((~np.isfinite(picture)).sum()),
     )
 
@@ -82,10 +84,16 @@ def largest(several: list[Errors]) -> Errors:
     return Errors(at=worst.at, **numbers)
 
 
-def _flip(picture: Array, truth: Array) -> float:
-    """Returns the mean of FLIP for linear pictures (H, W, 3), which are clipped to [0, 1], the range of a screen."""
+def flip_map(truth: Array, picture: Array, brightest: float | None = None) -> Array:
+    """Returns FLIP of each pixel, (H, W), for two linear pictures (H, W, 3).
+
+    brightest: None compares them as a screen shows them, clipped to [0, 1] (Andersson et al. 2020). A number compares them at
+        several exposures, so that values up to it can be told apart (Andersson et al. 2021); larger ones count as it.
+    """
     import OpenImageIO as oiio
 
-    clipped = [oiio.ImageBuf(np.ascontiguousarray(np.clip(p, 0, 1), dtype=np.float32)) for p in (truth, picture)]
-    difference = oiio.ImageBufAlgo.FLIP_diff(clipped[0], clipped[1], hdr=0, ppd=PIXELS_PER_DEGREE)
-    return float(np.mean(np.asarray(difference.get_pixels(oiio.FLOAT))))
+    high = 1.0 if brightest is None else min(brightest, BRIGHTEST)
+    first, second = (oiio.ImageBuf(np.ascontiguousarray(np.clip(p, 0.0, high), dtype=np.float32)) for p in (truth, picture))
+    hdr = int(brightest is not None)
+    difference = oiio.ImageBufAlgo.FLIP_diff(first, second, hdr=hdr, maxluminance=high, ppd=PIXELS_PER_DEGREE)
+    return np.asarray(difference.get_pixels(oiio.FLOAT))[..., 0]

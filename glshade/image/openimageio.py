@@ -39,7 +39,7 @@ def write(path: Path, contents: PictureContents, settings: Mapping[str, str | in
         spec.attribute(name, value)
     output = oiio.ImageOutput.create(str(path))
     if output is None:
-        raise OSError(_one_line(oiio.geterror()))
+        raise OSError(_error(oiio))
     if not hasattr(os, "memfd_create") or not Path(OPEN_FILES).is_dir():
         _encode(output, str(path), spec, contents.pixels)
         return
@@ -54,9 +54,9 @@ def _encode(output: Any, path: str, spec: oiio.ImageSpec, pixels: NDArray[Any]) 
     # close() writes the buffered rest. On a full disk it may return True and leave an error message. A message about
     # Exif is no failure: the TIFF writer leaves it if it could not add a table of Exif data.
     closed = output.close()
-    message = _one_line(output.geterror())
+    message = _error(output)
     if not (closed and written) or (message and "Exif" not in message):
-        raise OSError(message or _one_line(oiio.geterror()))
+        raise OSError(message or _error(oiio))
 
 
 def read(path: Path) -> PictureContents:
@@ -67,7 +67,7 @@ def read(path: Path) -> PictureContents:
     source = _opened(path, _keep_straight_alpha())
     spec = source.spec()
     pixels = source.read_image(oiio.FLOAT)
-    message = _one_line(source.geterror())
+    message = _error(source)
     source.close()
     if pixels is None or message:
         raise OSError(message or "no pixels")
@@ -90,7 +90,7 @@ def parts(path: Path) -> list[Part]:
         while source.seek_subimage(len(found), 0):
             found.append(_part(path, len(found), source.spec()))
         # Some formats leave a message when there is no further part. It must be fetched, or it would go to stderr.
-        message = _one_line(source.geterror())
+        message = _error(source)
     finally:
         source.close()
     if not found:
@@ -101,8 +101,10 @@ def parts(path: Path) -> list[Part]:
 def _part(path: Path, index: int, spec: oiio.ImageSpec) -> Part:
     """Returns one part of a file from its header. Errors: OSError where `parts` refuses it."""
     kind = str(spec.format)
-    if kind not in {"uint8", "float", "half"}:
-        raise OSError(f"holds numbers of the type {kind}; only 8-bit integers, float and half are compared")
+    # Only a file whose channels differ in type lists their types.
+    for stored in {str(channel) for channel in spec.channelformats} | {kind}:
+        if stored not in {"uint8", "float", "half"}:
+            raise OSError(f"holds numbers of the type {stored}; only 8-bit integers, float and half are compared")
     if any(item.name.endswith(":ColorSpace") and item.value in {"CMYK", "YCCK"} for item in spec.extra_attribs):
         raise OSError("is CMYK; only grey and RGB pictures are compared")
     if spec.deep or spec.depth > 1:
@@ -126,7 +128,7 @@ def _read_part(path: Path, index: int, kind: Any) -> NDArray[Any]:
     source = _opened(path, _keep_straight_alpha())
     spec = source.spec(index, 0)
     pixels = source.read_image(index, 0, 0, spec.nchannels, kind)
-    message = _one_line(source.geterror())
+    message = _error(source)
     source.close()
     if pixels is None or message:
         raise OSError(message or "no pixels")
@@ -171,7 +173,8 @@ def _opened(path: Path, *config: oiio.ImageSpec) -> Any:
         raise OSError("its name is not UTF-8, which OpenImageIO requires; rename it") from None
     source = oiio.ImageInput.open(str(path), *config)
     if source is None:
-        raise OSError(_one_line(oiio.geterror()))
+        # Some readers fail without a message.
+        raise OSError(_error(oiio) or "is damaged")
     return source
 
 
@@ -201,6 +204,11 @@ def _contiguous(pixels: NDArray[Any]) -> NDArray[Any]:
     return result
 
 
-def _one_line(message: str) -> str:
-    """Returns a message in one line, without the line breaks that OpenImageIO puts into it."""
+def _error(source: Any) -> str:
+    """Returns the error message that a file, or OpenImageIO itself, has left, in one line; empty if there is none."""
+    try:
+        message: str = source.geterror()
+    except UnicodeDecodeError as error:
+        # The message quotes a damaged name from the file.
+        message = error.object.decode(errors="backslashreplace")
     return "; ".join(line.strip() for line in message.splitlines() if line.strip())

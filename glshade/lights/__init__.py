@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field
 
+from glshade.arrays import unit_and_length
 from glshade.document import Document, Finite, Triple
 from glshade.found import Found
 
@@ -124,11 +125,7 @@ def direction_and_distance(to_light: Array) -> tuple[Array, Array]:
 
     At the light itself the direction is (0, 0, 0), so that no light arrives there.
     """
-    # The vectors are scaled to a largest component of 1 first, so that their squares neither overflow nor underflow.
-    scale = np.max(np.abs(to_light), axis=-1, keepdims=True)
-    scaled = to_light / np.where(scale > 0, scale, 1.0)
-    length = np.linalg.norm(scaled, axis=-1, keepdims=True)
-    return scaled / np.where(length > 0, length, 1.0), (length * scale)[..., 0]
+    return unit_and_length(to_light)
 
 
 LIGHTS: Found[Light] = Found("glshade.lights", Path(__file__).parent, suffix="Light")

@@ -35,11 +35,12 @@ from glshade.live.messages import (
 from glshade.live.snapshot import restored
 from glshade.live.views import Views
 from glshade.live.worker import RenderWorker
+from glshade.page.ramp import RAMP, heat
 from glshade.reference.picture import render
 from glshade.scene.scene import Scene
-from glshade.verification.candidates import Candidates, find_candidates, left_out, single_sample
+from glshade.verification.candidates import Candidates, find_candidates, judgeable, left_out
 from glshade.verification.judgement import PixelClass
-from glshade.verification.report import CLASS_MEANING, RAMP, heat
+from glshade.verification.report import CLASS_MEANING
 from glshade.verification.verdict import Verdict, verdict_of
 
 Array = NDArray[Any]
@@ -51,7 +52,7 @@ LISTED = 200
 class Trial:
     """A view that was judged.
 
-    scene: its scene, with one sample a pixel.
+    scene: its scene, without the settings that are not judged.
     expected: the values that its pixels may have.
     verdict: the result.
     left_out: the settings of the view that were not judged.
@@ -122,8 +123,7 @@ class Judge(RenderWorker):
             (part[nearest] if nearest >= 0 else expected.background)[: len(value)]
             for part in (expected.low, expected.high, expected.centre)
         )
-        base = int(trial.expected.base[nearest]) if nearest >= 0 else -1
-        fragments = trial.expected.fragments
+        owner, triangle = trial.expected.owner(nearest)
         kind = PixelClass(int(trial.verdict.classes[request.y, request.x]))
         explained = comparison.excess[request.y, request.x] <= 0
         return Probed(
@@ -135,8 +135,8 @@ class Judge(RenderWorker):
             low=_numbers(low),
             high=_numbers(high),
             kind=kind.name.lower(),
-            object=trial.expected.inputs.draws[int(fragments.draw[base])].instance.name if base >= 0 else None,
-            triangle=int(fragments.triangle[base]) if base >= 0 else None,
+            object=owner if triangle >= 0 else None,
+            triangle=triangle if triangle >= 0 else None,
             text=f"{'explained' if explained else 'not explained'}: {CLASS_MEANING[kind]}",
             revision=self._number,
         )
@@ -197,11 +197,11 @@ class Judge(RenderWorker):
         """Draws a scene and compares it with the reference."""
         assert self._views is not None
         self._views.revision.draw_with(self.renderer)
-        single = single_sample(scene)
+        judged = judgeable(scene)
         # The reference comes first: a model without one is refused before anything is drawn.
-        expected = find_candidates(single, shading=shading, driver=measure_freedom(self.renderer.context))
-        picture = self.renderer.render(single, dtype="float32", shading=shading).pixels.copy()
-        return Trial(single, expected, verdict_of(picture, expected, explain=False), left_out(scene))
+        expected = find_candidates(judged, shading=shading, driver=measure_freedom(self.renderer.context))
+        picture = self.renderer.render(judged, dtype="float32", shading=shading).pixels.copy()
+        return Trial(judged, expected, verdict_of(picture, expected, explain=False), left_out(scene))
 
 
 def _sentence(trial: Trial) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.arrays import unit_and_length
 from glshade.lights import FALLOFFS
 from glshade.radiance.draw import Draw, Lamp
 from glshade.radiance.sampler import Sampler
@@ -229,11 +230,7 @@ def _property(draw: Draw, surface: Surface) -> Array:
 
 def _unit(x: Array) -> Array:
     """Returns the vectors x (..., 3), of any leading shape, made unit; the zero vector stays as it is."""
-    largest = np.abs(x).max(axis=-1, keepdims=True)
-    scaled = x / np.where(largest > 0, largest, 1)
-    length = np.linalg.norm(scaled, axis=-1, keepdims=True)
-    result: Array = scaled / np.where(length > 0, length, 1)
-    return result
+    return unit_and_length(x)[0]
 
 
 def _without(x: Array, n: Array) -> Array:

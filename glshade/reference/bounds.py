@@ -7,7 +7,7 @@ its own arithmetic. The rule is the same for every model.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, fields, replace
 from itertools import product
 from typing import Any
@@ -28,11 +28,14 @@ from glshade.radiance.surface import (
 from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.inputs import Inputs
 from glshade.reference.interpolate import blend, weights
+from glshade.reference.patches import GRID_LINES, TRIANGLE_LINES, Range, light_range, on_grid, on_triangles
 from glshade.reference.planes import Planes
 from glshade.reference.raster import Fragments, U
 from glshade.reference.shade import AT_CENTRE, by_draw, places, surface_at
+from glshade.reference.slivers import slimness
 
 Array = NDArray[Any]
+Flags = NDArray[np.bool_]
 
 # The error of each component of a unit vector that the vertex stage computes. A dot product of three terms contributes about
 # 1.5 roundings, inversesqrt 1 and a product 0.5.
@@ -62,6 +65,14 @@ BENT = 0.1
 # A light counts as close to a box of positions if its distance is below this multiple of the box's largest error: the light
 # then changes over the box by more than a linear function tells.
 CLOSE = 16.0
+# If a fragment may be shaded anywhere in its pixel and the light is curved there, it is shaded at this many places in each
+# direction.
+GRID = 5
+# A triangle that is not wider and not higher than this is shaded as a whole wherever a driver may shade it in a pixel [pixels].
+SMALL = 0.75
+# A triangle with at least this height has attributes that do not change by more than from corner to corner in a pixel, so that
+# they may be extrapolated over the pixels at its border [pixels].
+BROAD = 1.0
 # The number of times that the search for the brightest and the darkest point of the box follows each axis.
 CLIMBS = 2
 
@@ -120,47 +131,80 @@ class Bounds:
         return cls(**{f.name: np.zeros(count if f.name in flat else (count, 3)) for f in fields(cls)})
 
 
-def alphas(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> tuple[Array, Array, Array]:
+def alphas(
+    inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE, anywhere: Flags | None = None
+) -> tuple[Array, Array, Array]:
     """Returns alpha before a cut-out compares it with its cutoff: (exact, least possible, largest possible value), each (N,).
 
     inputs: the scene with its uploaded values.
     fragments: fragments of any draws in any order.
     driver: the errors of the driver's fixed functions.
+    anywhere: optional (N,); True for fragments that may not cover all samples of their pixels, and so may be shaded beside the
+        pixel's centre.
     """
     result = np.ones((3, len(fragments)))
     for draw, indices, part in by_draw(inputs, fragments):
         if draw.alpha_mode != "opaque":
-            surface = surface_at(draw, part, inputs.size, AT_CENTRE)
-            errors = _errors(draw, part, surface, Planes(draw, part, inputs.size, driver), driver)
-            result[:, indices] = _alphas(draw, surface, errors, driver)
+            for which, extent in _places(indices, anywhere, inputs.extent):
+                pieces = part.take(which)
+                planes = Planes(draw, pieces, inputs.size, driver)
+                surface, errors = _attributes(draw, pieces, planes, driver, extent)
+                result[:, indices[which]] = _alphas(draw, surface, errors, driver)
     return result[0], result[1], result[2]
 
 
-def fragment_bounds(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> Bounds:
+def fragment_bounds(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE, anywhere: Flags | None = None) -> Bounds:
     """Returns the limits between which a driver may show the light and the alpha of fragments.
 
     inputs: the scene with its uploaded values.
     fragments: fragments of any draws in any order.
     driver: the errors of the driver's fixed functions.
+    anywhere: as for `alphas`.
     """
     result = Bounds.empty(len(fragments))
     for draw, indices, part in by_draw(inputs, fragments):
-        planes = Planes(draw, part, inputs.size, driver)
-        if draw.instance.rate == "phong":
-            limits = _per_pixel(draw, part, inputs.size, planes, driver)
-        elif draw.instance.rate == "gouraud":
-            limits = _per_vertex(draw, part, inputs.size, planes)
-        else:
-            limits = _per_face(draw, part, driver)
-        for name, values in limits.items():
-            getattr(result, name)[indices] = values
-        if draw.alpha_mode == "blend":
-            surface = surface_at(draw, part, inputs.size, AT_CENTRE)
-            alpha_limits = _alphas(draw, surface, _errors(draw, part, surface, planes, driver), driver)
-            result.alpha[indices], result.alpha_low[indices], result.alpha_high[indices] = alpha_limits
-        else:
-            result.alpha[indices] = result.alpha_low[indices] = result.alpha_high[indices] = 1.0
+        for which, extent in _places(indices, anywhere, inputs.extent):
+            limits = _limits(draw, part.take(which), inputs.size, driver, extent)
+            for name, values in limits.items():
+                getattr(result, name)[indices[which]] = values
     return result
+
+
+def _places(indices: NDArray[np.intp], anywhere: Flags | None, extent: float) -> list[tuple[NDArray[np.intp], float]]:
+    """Returns pairs of places in `indices` (K,) and half the side of the square in which the fragments there may be shaded.
+
+    A fragment is shaded at its pixel's centre if it covers all samples. With several samples per pixel, a fragment that may
+    cover only some of them may be shaded anywhere within the pixel and the triangle (`centroid`, GLSL 4.60, 4.5).
+    indices: the numbers (K,) of some fragments.
+    anywhere: optional (N,); True for fragments that may not cover all samples of their pixels.
+    extent: half the side of the square in which a pixel has its samples [pixels].
+    """
+    if not extent or anywhere is None:
+        return [(np.arange(len(indices)), 0.0)]
+    parts = [(np.flatnonzero(~anywhere[indices]), 0.0), (np.flatnonzero(anywhere[indices]), extent)]
+    return [(which, square) for which, square in parts if len(which)]
+
+
+def _limits(draw: Draw, fragments: Fragments, size: tuple[int, int], driver: Freedom, extent: float) -> dict[str, Array]:
+    """Returns the fields of Bounds by name for N fragments of one draw.
+
+    draw: the instance that is drawn.
+    fragments: N fragments of the draw.
+    size: width and height of the picture [pixels].
+    driver: the errors of the driver's fixed functions.
+    extent: half the side of the square round the pixel's centre in which the fragments may be shaded [pixels].
+    """
+    planes = Planes(draw, fragments, size, driver)
+    if draw.instance.rate == "phong":
+        limits = _per_pixel(draw, fragments, planes, driver, extent)
+    elif draw.instance.rate == "gouraud":
+        limits = _per_vertex(draw, fragments, planes, extent)
+    else:
+        limits = _per_face(draw, fragments, driver)
+    alpha = np.ones((3, len(fragments)))
+    if draw.alpha_mode == "blend":
+        alpha = _alphas(draw, *_attributes(draw, fragments, planes, driver, extent), driver)
+    return {**limits, **dict(zip(("alpha", "alpha_low", "alpha_high"), alpha, strict=True))}
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +212,7 @@ class _Errors:
     """The errors of a Surface's attributes. Each has the shape of its attribute, or is None if the attribute has no effect.
 
     level: the least and the largest number (N,) to add to the level of detail.
+    share: for attributes that are not known in a square, the largest ratio (N,) of a driver's error to half of the range.
     """
 
     position: Array | None = None
@@ -176,38 +221,59 @@ class _Errors:
     uv: Array | None = None
     colour: Array | None = None
     level: tuple[Array, Array] | None = None
+    share: Array | None = None
 
 
-def _errors(draw: Draw, fragments: Fragments, surface: Surface, planes: Planes, driver: Freedom) -> _Errors:
-    """Returns the errors of interpolated attributes.
+def _attributes(draw: Draw, fragments: Fragments, planes: Planes, driver: Freedom, extent: float) -> tuple[Surface, _Errors]:
+    """Returns interpolated attributes and their errors.
 
+    If a fragment may be shaded anywhere in a square, its attributes are in the middle of their ranges there, and half of the
+    range counts as an error. Texture coordinates, which are not declared `centroid`, may also be those of a place beside the
+    triangle.
     draw: the instance that is drawn.
     fragments: N fragments of the draw.
-    surface: their exact attributes.
     planes: the plane equations of their triangles.
     driver: the errors of the driver's fixed functions.
+    extent: as for `_limits`.
     """
+    surface = surface_at(draw, fragments, planes.size, AT_CENTRE)
     vertices, place = np.unique(planes.corners, return_inverse=True)
     corner = at_vertices(draw, vertices, np.float64)
     place = place.reshape(-1, 3)
     errors: dict[str, Any] = {}
+    middles: dict[str, Any] = {}
+
+    def add(name: str, vertex: Array | float, columns: slice = slice(None)) -> None:
+        """Adds the errors of one attribute, whose errors at the corners are `vertex`."""
+        values = getattr(corner, name)[place][..., columns]
+        if extent:
+            middles[name] = getattr(surface, name).copy()
+            middles[name][:, columns], half, error = planes.over_square(values, vertex, extent)
+            errors[name] = half + error
+            errors["share"] = np.maximum(errors.get("share", 0.0), error.max(axis=1) / np.maximum(half.max(axis=1), TINY))
+        else:
+            errors[name] = planes.errors(values, vertex)
+
     if _positions_matter(draw):
-        errors["position"] = planes.errors(corner.position[place], driver.window * U * planes.world)
+        add("position", driver.window * U * planes.world)
     if draw.lamps or draw.surrounds:
-        errors["normal"] = planes.errors(corner.normal[place], UNIT)
+        add("normal", UNIT)
         if corner.tangent is not None:
-            errors["tangent"] = planes.errors(corner.tangent[place][..., :3], UNIT)
+            add("tangent", UNIT, slice(3))
+    if corner.colour is not None:
+        add("colour", 0.0)
     if corner.uv is not None and surface.footprint is not None:
         # The driver wraps a texture coordinate, scales it and subtracts half a texel. Each of these operations rounds relative
         # to the whole side of the texture.
         errors["uv"] = planes.errors(corner.uv[place], 4 * U)
+        # With several samples, they may be those of any place in the pixel, within the triangle or not (GLSL 4.60, 4.5).
+        right, down = surface.footprint
+        errors["uv"] = errors["uv"] + extent * (np.abs(right) + np.abs(down))
         if driver.texel:
             largest_texel = max(1 / sampler.size.min() for sampler in draw.pictures)
             errors["uv"] = errors["uv"] + driver.texel * largest_texel
         errors["level"] = _levels(draw, fragments, surface, planes.size, driver)
-    if corner.colour is not None:
-        errors["colour"] = planes.errors(corner.colour[place], 0.0)
-    return _Errors(**errors)
+    return replace(surface, **middles), _Errors(**errors)
 
 
 def _vertex_errors(draw: Draw, surface: Surface, vertices: NDArray[np.intp], driver: Freedom) -> _Errors:
@@ -233,19 +299,104 @@ def _positions_matter(draw: Draw) -> bool:
     return any("position" in lamp.values for lamp in draw.lamps) or (bool(draw.lamps) and draw.viewer is None)
 
 
-def _per_pixel(draw: Draw, fragments: Fragments, size: tuple[int, int], planes: Planes, driver: Freedom) -> dict[str, Array]:
+def _per_pixel(draw: Draw, fragments: Fragments, planes: Planes, driver: Freedom, extent: float) -> dict[str, Array]:
     """Returns the fields of Bounds by name, without those of alpha, for fragments that are shaded per pixel."""
-    surface = surface_at(draw, fragments, size, AT_CENTRE)
+    surface, errors = _attributes(draw, fragments, planes, driver, extent)
     side = np.where(fragments.front | (not draw.instance.back_faces), 1.0, -1.0)
     surface = replace(surface, side=side)
-    return _spread(draw, evaluate_surface, surface, _errors(draw, fragments, surface, planes, driver))
+    if not extent:
+        return _spread(draw, evaluate_surface, surface, errors)
+    if errors.uv is None:
+        return _over_patches(draw, fragments, surface, errors, planes, extent)
+    return _searched(draw, fragments, surface, errors, planes.size, extent)
 
 
-def _per_vertex(draw: Draw, fragments: Fragments, size: tuple[int, int], planes: Planes) -> dict[str, Array]:
+def _searched(
+    draw: Draw, fragments: Fragments, surface: Surface, errors: _Errors, size: tuple[int, int], extent: float
+) -> dict[str, Array]:
+    """Returns the fields of Bounds by name, without those of alpha, from the boxes of possible attributes in a square.
+
+    Where the light is curved, it is evaluated at GRID x GRID places as well.
+    surface: attributes in the middle of their ranges in the square.
+    errors: half of these ranges, and the driver's errors.
+    """
+
+    def patch(which: NDArray[np.intp]) -> Iterator[Surface]:
+        part, points = fragments.take(which), _take(surface, which)
+        return on_grid(draw, part, points, size, extent, GRID, inside=True)
+
+    return _spread(draw, evaluate_surface, surface, errors, patch)
+
+
+def _over_patches(
+    draw: Draw, fragments: Fragments, surface: Surface, errors: _Errors, planes: Planes, extent: float
+) -> dict[str, Array]:
+    """Returns the fields of Bounds by name, without those of alpha, for fragments that may be shaded anywhere in a square.
+
+    Small triangles are shaded as a whole, and once for all the pixels that they touch. Over large ones, the square is shaded,
+    although some of it lies beside the triangle, where the attributes are extrapolated by little. What is left are needles and
+    triangles near the horizon.
+    surface, errors: as for `_searched`.
+    """
+    window = planes.window
+    longest = np.linalg.norm(np.roll(window, -1, axis=1) - window, axis=2).max(axis=1)
+    small = planes.whole & (np.ptp(window, axis=1).max(axis=1) <= SMALL)
+    broad = planes.whole & ~small & (longest >= BROAD * slimness(window))
+    result: dict[str, Array] = {}
+
+    def add(which: NDArray[np.intp], limits: dict[str, Array]) -> None:
+        for name, values in limits.items():
+            result.setdefault(name, np.zeros((len(fragments), *values.shape[1:])))[which] = values
+
+    at = planes.place
+    tiny, wide, other = (np.flatnonzero(flags) for flags in (small[at], broad[at], ~(small | broad)[at]))
+    if len(tiny):
+        _, first, group = np.unique(2 * at[tiny] + (surface.side[tiny] > 0), return_index=True, return_inverse=True)
+        part = tiny[first]
+        points = on_triangles(draw, fragments.take(part), _take(surface, part))
+        found = light_range(draw, points, TRIANGLE_LINES, _float32)
+        found = Range(*(getattr(found, f.name)[group.reshape(-1)] for f in fields(Range)))
+        add(tiny, _ranged(draw, _take(surface, tiny), _share(errors, tiny), found))
+    if len(wide):
+        points = on_grid(draw, fragments.take(wide), _take(surface, wide), planes.size, extent, 3, inside=False)
+        found = light_range(draw, points, GRID_LINES, _float32)
+        add(wide, _ranged(draw, _take(surface, wide), _share(errors, wide), found))
+    if len(other):
+        add(other, _searched(draw, fragments.take(other), _take(surface, other), _taken(errors, other), planes.size, extent))
+    return result
+
+
+def _share(errors: _Errors, which: NDArray[np.intp]) -> Array:
+    """Returns the share (K, 1) of attributes' ranges, at most 1, that the driver's errors of the attributes make up."""
+    share = np.zeros(len(which)) if errors.share is None else np.minimum(errors.share[which], 1.0)
+    result: Array = share[:, None]
+    return result
+
+
+def _ranged(draw: Draw, surface: Surface, share: Array, found: Range) -> dict[str, Array]:
+    """Returns the fields of Bounds by name, without those of alpha, for the light's range over patches.
+
+    A driver's errors of the attributes change the light by at most their share of the attributes' ranges. An attribute that
+    does not change in the square has errors of a few roundings, which count like the roundings of the shading.
+    """
+    room = share * (found.high - found.low) + AGAIN * found.rounding
+    value, half = (found.low + found.high) / 2, (found.high - found.low) / 2 + room
+    return {
+        "value": value,
+        "below": half,
+        "above": half,
+        "level": np.zeros_like(value),
+        "rounding": found.rounding,
+        "arriving": light_at(draw, surface.position),
+        "magnitude": np.abs(value) * max(1.0, len(draw.lamps + draw.surrounds) / SUMMED),
+    }
+
+
+def _per_vertex(draw: Draw, fragments: Fragments, planes: Planes, extent: float) -> dict[str, Array]:
     """Returns the fields of Bounds by name, without those of alpha, for fragments with light interpolated from the corners."""
     corners = draw.triangles[fragments.triangle]
-    x, y = places(fragments, size, AT_CENTRE)
-    weight = weights(draw, fragments.triangle, x, y, size, derivatives=False).values
+    x, y = places(fragments, planes.size, AT_CENTRE)
+    weight = weights(draw, fragments.triangle, x, y, planes.size, derivatives=False).values
     result: dict[str, Array] = {}
     back = ~fragments.front & draw.instance.back_faces
     interpolation = np.zeros((len(fragments), 3))
@@ -258,12 +409,18 @@ def _per_vertex(draw: Draw, fragments: Fragments, size: tuple[int, int], planes:
         surface = replace(at_vertices(draw, vertices, np.float64), side=np.full(len(vertices), side))
         limits = _spread(draw, evaluate_surface, surface, _vertex_errors(draw, surface, vertices, planes.driver))
         for name, values in limits.items():
+            # Anywhere in a square, no error is larger than the largest at a corner.
             by = weight[indices] if name == "value" else np.abs(weight[indices])
-            result.setdefault(name, np.zeros((len(fragments), 3)))[indices] = blend(by, values[place])
+            at = values[place].max(axis=1) if extent else blend(by, values[place])
+            result.setdefault(name, np.zeros((len(fragments), 3)))[indices] = at
         # Triangles that show only the other side get meaningless plane equations here; their errors are not used.
         table = np.zeros((len(draw.instance.mesh.positions), 3))
         table[vertices] = limits["value"]
-        interpolation[indices] = planes.errors(table[planes.corners], 0.0)[indices]
+        if extent:
+            middle, half, error = planes.over_square(table[planes.corners], 0.0, extent)
+            result["value"][indices], interpolation[indices] = middle[indices], (half + error)[indices]
+        else:
+            interpolation[indices] = planes.errors(table[planes.corners], 0.0)[indices]
     result["below"], result["above"] = result["below"] + interpolation, result["above"] + interpolation
     return result
 
@@ -284,7 +441,13 @@ def _per_face(draw: Draw, fragments: Fragments, driver: Freedom) -> dict[str, Ar
     return {name: values[place] for name, values in limits.items()}
 
 
-def _spread(draw: Draw, evaluate: Callable[..., Array], surface: Surface, errors: _Errors) -> dict[str, Array]:
+def _spread(
+    draw: Draw,
+    evaluate: Callable[..., Array],
+    surface: Surface,
+    errors: _Errors,
+    patch: Callable[[NDArray[np.intp]], Iterator[Surface]] | None = None,
+) -> dict[str, Array]:
     """Returns the fields of Bounds by name, without those of alpha.
 
     The model is evaluated at the exact surface, at surfaces whose attributes are perturbed, and in float32.
@@ -292,6 +455,8 @@ def _spread(draw: Draw, evaluate: Callable[..., Array], surface: Surface, errors
     evaluate: a function that returns the light (N, 3). Its arguments are draw, surface and, optionally, material.
     surface: the exact attributes.
     errors: their errors.
+    patch: optional, for errors as large as a pixel; a function that yields the true points of some fragments on a square grid.
+        Where the light is curved, these tell more than the corners of the errors' boxes.
     """
     material = material_of(draw, surface)
     value = evaluate(draw, surface, material)
@@ -303,12 +468,21 @@ def _spread(draw: Draw, evaluate: Callable[..., Array], surface: Surface, errors
         np.add(below, np.maximum(value - (np.minimum.reduce(values) - margin), 0), out=below)
         np.add(above, np.maximum(np.maximum.reduce(values) + margin - value, 0), out=above)
 
+    curved = np.zeros(len(value), dtype=np.bool_)
     for name in ("normal", "position", "tangent"):
         error = getattr(errors, name)
         if error is not None:
-            low, high, uncertain = over_box(draw, evaluate, surface, name, error, value, material)
+            low, high, uncertain, bent = over_box(draw, evaluate, surface, name, error, value, material, patch is None)
             rounding = np.maximum(rounding, uncertain)
+            curved |= bent
             widen([low, high])
+    which = np.flatnonzero(curved)
+    if patch is not None and len(which):
+        light = np.stack([evaluate(draw, place) for place in patch(which)])
+        grid = light.reshape(GRID, GRID, *light.shape[1:])
+        margin = np.maximum(_between(list(grid)).max(axis=0), _between(list(grid.swapaxes(0, 1))).max(axis=0))
+        below[which] += np.maximum(value[which] - light.min(axis=0) + margin, 0)
+        above[which] += np.maximum(light.max(axis=0) + margin - value[which], 0)
     for axis, error in enumerate([] if errors.uv is None else errors.uv.T):
         # Filtered textures have a kink at the middle of every texel, so the ends of the error are not enough.
         shifts = _spaced(-error, error, SHIFTS)
@@ -334,16 +508,25 @@ def _spread(draw: Draw, evaluate: Callable[..., Array], surface: Surface, errors
 
 
 def over_box(
-    draw: Draw, evaluate: Callable[..., Array], surface: Surface, name: str, error: Array, value: Array, material: Any
-) -> tuple[Array, Array, Array]:
-    """Returns (the least light, the largest light, the largest rounding error), each (N, 3), over a box of possible attributes.
+    draw: Draw,
+    evaluate: Callable[..., Array],
+    surface: Surface,
+    name: str,
+    error: Array,
+    value: Array,
+    material: Any,
+    search: bool = True,
+) -> tuple[Array, Array, Array, Flags]:
+    """Returns (low, high, rounding, curved) of a box of possible attributes.
 
-    The errors of a vector's three components make a box round its exact value.
+    The errors of a vector's three components make a box round its exact value. low and high are the least and the largest light
+    (N, 3) over the box, rounding is the largest rounding error (N, 3), and curved says whether (N,) a peak may lie in the box.
     draw, evaluate, surface: as in _spread.
     name: the attribute: normal, position or tangent.
     error: the errors (N, 3) of its first three components, half the sides of the box.
     value: the light (N, 3) at the exact attribute.
     material: the material of the surface's points, which does not depend on the attribute.
+    search: whether to look for the peak where there may be one.
     """
 
     def moved(points: Surface, by: Array) -> Surface:
@@ -378,7 +561,7 @@ def over_box(
     for toward in towards:
         curved |= np.linalg.norm(toward, axis=1) < CLOSE * error.max(axis=1)
     bent = np.flatnonzero(curved)
-    if len(bent):
+    if search and len(bent):
         points = _take(surface, bent)
         least, largest = _search(
             lambda offset: evaluate(draw, moved(points, offset)),
@@ -387,7 +570,7 @@ def over_box(
             [toward[bent] for toward in towards],
         )
         low[bent], high[bent] = np.minimum(low[bent], least), np.maximum(high[bent], largest)
-    return low, high, rounding
+    return low, high, rounding, curved
 
 
 def _search(light: Callable[[Array], Array], half: Array, diagonals: list[Array], towards: list[Array]) -> tuple[Array, Array]:
@@ -496,6 +679,14 @@ def _take(surface: Surface, indices: NDArray[np.intp]) -> Surface:
         return value[indices] if isinstance(value, np.ndarray) else value
 
     return replace(surface, **{f.name: take(getattr(surface, f.name)) for f in fields(surface)})
+
+
+def _taken(errors: _Errors, indices: NDArray[np.intp]) -> _Errors:
+    """Returns the errors at the points with these indices."""
+    values = {f.name: getattr(errors, f.name) for f in fields(errors)}
+    level = values.pop("level")
+    taken = {name: None if value is None else value[indices] for name, value in values.items()}
+    return _Errors(**taken, level=None if level is None else (level[0][indices], level[1][indices]))
 
 
 def _moved(surface: Surface, name: str, axis: int, by: Array) -> Surface:

@@ -8,7 +8,7 @@ therefore differ.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -39,12 +39,17 @@ class Inputs:
     background: the background (4,), linear and premultiplied.
     draws: the instances with their values: opaque ones first, then blended ones from back to front.
     window: x, y, width and height [pixels] of the part of the picture that is rendered.
+    clip_from_world: the matrix (4, 4) from positions relative to the eye to clip space, before it is rounded.
+    extent: half the side of the square round a pixel's centre in which the pixel has its samples [pixels]. It is 0 for one
+        sample a pixel, which lies at the centre; of several samples, only the driver knows the places.
     """
 
     size: tuple[int, int]
     background: Array
     draws: tuple[Draw, ...]
     window: tuple[int, int, int, int]
+    clip_from_world: Array
+    extent: float = 0.0
 
     @cached_property
     def wanted(self) -> Indices:
@@ -52,9 +57,14 @@ class Inputs:
         x, y, w, h = self.window
         return np.add.outer(np.arange(y, y + h) * self.size[0], np.arange(x, x + w))
 
+    def shifted(self, right: float, down: float) -> Inputs:
+        """Returns the values for a picture whose pixels lie farther to the right and farther down [pixels]."""
+        clip = wide(window(self.clip_from_world, self.size, right, down, *self.size))
+        return replace(self, draws=tuple(replace(draw, clip_from_world=clip) for draw in self.draws))
+
 
 def prepare(scene: Scene, shading: Rate | None = None, part: Part | None = None) -> Inputs:
-    """Returns the values that the GPU renderer uploads for a linear picture with one sample per pixel.
+    """Returns the values that the GPU renderer uploads for a linear picture that is not shifted within its pixels.
 
     scene: the scene to draw.
     shading: optional; replaces the shading rate of every object.
@@ -66,10 +76,11 @@ def prepare(scene: Scene, shading: Rate | None = None, part: Part | None = None)
     alpha = colour[3] if len(colour) == 4 else 1.0
     background = wide([*(c * alpha for c in colour[:3]), alpha])
     width, height = scene.film.size
-    clip = wide(window(assembly.view.clip_from_world(zero_to_one=True), (width, height), 0, 0, width, height))
+    whole = assembly.view.clip_from_world(zero_to_one=True)
+    clip = wide(window(whole, (width, height), 0, 0, width, height))
     samplers: dict[Texels, Sampler] = {}
     draws = (placed(scene, assembly, instance, clip, samplers) for instance in _in_order(assembly))
-    return Inputs((width, height), background, tuple(draws), scene.film.window)
+    return Inputs((width, height), background, tuple(draws), scene.film.window, whole, 0.5 if scene.film.samples > 1 else 0.0)
 
 
 def _in_order(assembly: Assembly) -> Iterator[Instance]:

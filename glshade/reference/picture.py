@@ -31,7 +31,12 @@ def render(scene: Scene, *, shading: Rate | None = None) -> Image:
 
 
 def radiance(
-    scene: Scene, *, shading: Rate | None = None, sampling: Sampling = AT_CENTRE, part: Part | None = None
+    scene: Scene,
+    *,
+    shading: Rate | None = None,
+    sampling: Sampling = AT_CENTRE,
+    part: Part | None = None,
+    offset: tuple[float, float] = (0.0, 0.0),
 ) -> NDArray[Any]:
     """Returns the pixels (H, W, 4) of the film's window, float64, linear Rec. 709, premultiplied, row 0 at the top.
 
@@ -39,9 +44,10 @@ def radiance(
     shading: optional; replaces the shading rate of every object.
     sampling: where and how precisely fragments are shaded and cut out. Coverage and depth are always tested at the centre.
     part: optional; the part of the scene's light, or the property of its surfaces, that is shown.
+    offset: the distance (right, down) by which all pixels are shifted, for the mean of several pictures [pixels].
     Errors: SceneError.
     """
-    inputs = prepare(part.scene(scene) if part else scene, shading, part)
+    inputs = prepare(part.scene(scene) if part else scene, shading, part).shifted(*offset)
     nearest, layers = resolve(inputs, rasterise(inputs), lambda fragments: is_there(inputs, fragments, sampling))
     width, height = inputs.size
     picture: NDArray[Any] = np.broadcast_to(inputs.background, (width * height, 4)).astype(sampling.dtype)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -11,22 +13,55 @@ from glshade.radiance.draw import Draw
 from glshade.reference import clip
 from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.inputs import Inputs
-from glshade.reference.raster import MARGIN, SUBPIXELS, Fragments, U
+from glshade.reference.raster import SUBPIXELS, Fragments, U
 from glshade.reference.shade import AT_CENTRE, by_draw, places
 from glshade.reference.slivers import Clipped, slimness
 
 Array = NDArray[Any]
 
-# A triangle whose height is less than this may turn over, because snapping moves each corner by up to one step [pixels].
-FLAT = 4 / SUBPIXELS
+# A triangle whose height is less than this may turn over, because snapping moves each corner by up to one step [steps].
+FLAT = 4
+# The renderer draws pictures with several samples in pieces of at most this size (glshade/gl/tiles.py), and drivers clip
+# triangles at a piece's border, too [pixels].
+PIECE = 4096
 
 
-def depth_slack(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> Array:
-    """Returns the largest difference (N,) between the driver's depth and the reference's.
+@dataclass(frozen=True, eq=False)
+class Depths:
+    """The depths that N fragments may have at a pixel's samples, 1 near and 0 far.
 
-    The difference comes from the plane equation of the depth and from roundings of the depth itself.
+    slack: the largest difference (N,) between the driver's depth at a place and the reference's at the same place.
+    slope: the changes (N, 2) of the depth from a pixel to the next one to the right and to the next one below.
+    nearest: the largest depth (N,) that a driver may find at a sample.
+    farthest: the smallest depth (N,) that a driver may find at a sample.
+    cut: whether (N,) the driver may have cut the triangle into several, because it reaches beyond the view.
     """
-    result = np.zeros(len(fragments))
+
+    slack: Array
+    slope: Array
+    nearest: Array
+    farthest: Array
+    cut: NDArray[np.bool_]
+
+    def take(self, which: Any) -> Depths:
+        """Returns the depths of the fragments that an index array or a mask selects."""
+        return Depths(**{f.name: getattr(self, f.name)[which] for f in fields(self)})
+
+    @classmethod
+    def joined(cls, parts: Iterable[Depths]) -> Depths:
+        """Returns the depths of all parts, in the order of the parts."""
+        parts = list(parts) or [cls(np.empty(0), np.empty((0, 2)), np.empty(0), np.empty(0), np.empty(0, dtype=np.bool_))]
+        return cls(**{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)})
+
+
+def depths(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> Depths:
+    """Returns the depths that N fragments may have.
+
+    A driver's depth differs from the reference's by errors of the depth's plane equation and by roundings of the depth itself.
+    """
+    slack, slope = np.zeros(len(fragments)), np.zeros((len(fragments), 2))
+    low, high = np.zeros(len(fragments)), np.ones(len(fragments))
+    cut = np.zeros(len(fragments), dtype=np.bool_)
     for draw, indices, part in by_draw(inputs, fragments):
         planes = Planes(draw, part, inputs.size, driver)
         error = planes.depth_error()
@@ -34,8 +69,19 @@ def depth_slack(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE
         corner = planes.depths[planes.place]
         edge_on = planes.flat | planes.thin[planes.place]
         error = np.where(edge_on, np.maximum(error, np.abs(part.depth[:, None] - corner).max(axis=1)), error)
-        result[indices] = np.where(planes.flat, np.maximum(error, 1.0), error) + 4 * U * np.abs(part.depth)
-    return result
+        slack[indices] = np.where(planes.flat, np.maximum(error, 1.0), error) + 4 * U * np.abs(part.depth)
+        cut[indices] = planes.clipped[planes.place] | (max(inputs.size) > PIECE)
+        if inputs.extent:
+            slope[indices] = np.where(edge_on[:, None], 0.0, planes.depth_slope())
+            # All samples of a fragment lie on its triangle, so that their depths lie between those of its corners.
+            whole = planes.whole[planes.place] & ~planes.flat
+            low[indices] = np.where(whole, corner.min(axis=1), 0.0)
+            high[indices] = np.where(whole, corner.max(axis=1), 1.0)
+    if not inputs.extent:
+        return Depths(slack, slope, fragments.depth + slack, fragments.depth - slack, cut)
+    spread = inputs.extent * np.abs(slope).sum(axis=1)
+    nearest = np.clip(fragments.depth + spread, low, high) + slack
+    return Depths(slack, slope, nearest, np.clip(fragments.depth - spread, low, high) - slack, cut)
 
 
 def may_turn(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> NDArray[np.bool_]:
@@ -70,7 +116,7 @@ class Planes:
     G: the plane equations (T, 3, 3), one row per corner.
     B: the plane equations (N, 3) of 1 / w at the fragments' triangles.
     B_size: the sums (N,) of the absolute values of the terms of 1 / w. The rounding error of 1 / w is proportional to them.
-    at: the fragments' centres (N, 3), as (x, y, 1) [pixels].
+    at: the centres (N, 3) of the fragments' pixels, as (x, y, 1) [pixels].
     w: w (N,) at the fragments.
     flat: whether (N,) the triangle is seen edge-on.
     world: the sums (T, 3, 3) of the absolute values of the terms that make up the corners' world positions.
@@ -140,7 +186,7 @@ class Planes:
         slim = slimness(window)
         # The height of a triangle is its longest side divided by its slimness.
         longest = np.linalg.norm(np.roll(window, -1, axis=1) - window, axis=2).max(axis=1)
-        self.thin = ~behind & (longest <= FLAT * slim)
+        self.thin = ~behind & (longest <= FLAT * self.driver.step * slim)
         self.slim = slim[self.place]
         self.drawn = np.concatenate([window, np.ones((*window.shape[:2], 1))], axis=2)
         cut = np.flatnonzero(self.clipped)
@@ -152,27 +198,44 @@ class Planes:
             row = np.full(len(at), -1)
             row[cut] = np.arange(len(cut))
             which = np.flatnonzero(row[self.place] >= 0)
-            self.slim[which] = parts.slimness(row[self.place[which]], self.at[which, :2], MARGIN / SUBPIXELS)
+            self.slim[which] = parts.slimness(row[self.place[which]], self.at[which, :2], self.driver.margin / SUBPIXELS)
 
-    def distance(self) -> Array:
-        """Returns the distances (N, 3) of the fragments' centres from the edges' lines [pixels]. Edge i is opposite
-        corner i.
+    def distance(self, extent: float) -> Array:
+        """Returns the distances (N, 3) of squares from the triangles' edges [pixels]. Edge i is opposite corner i.
+
+        A distance is measured to the line through the edge; it is 0 or negative where the line meets the square.
+        extent: half the side of the squares round the fragments' centres [pixels].
         """
         lines = self.G[self.place]
         steepness = np.hypot(lines[..., 0], lines[..., 1])
         # An edge without a length is near everything.
-        result: Array = np.abs(np.einsum("nij,nj->ni", lines, self.at)) / np.where(steepness > 0, steepness, np.inf)
-        return result
+        steepness = np.where(steepness > 0, steepness, np.inf)
+        away = np.abs(np.einsum("nij,nj->ni", lines, self.at)) - extent * np.abs(lines[..., :2]).sum(axis=2)
+        return self._beside(away / steepness, self.window, extent)
 
-    def snapped_distance(self) -> Array:
+    def snapped_distance(self, extent: float) -> Array:
         """As `distance`, with corners snapped as for coverage. Both triangles at an edge have the same distance from it."""
         window = np.rint(self.window * SUBPIXELS) / SUBPIXELS
         start, end = window[:, [1, 2, 0]], window[:, [2, 0, 1]]
         side = (end - start)[self.place]
         away = self.at[:, None, :2] - start[self.place]
         length = np.hypot(side[..., 0], side[..., 1])
-        area = np.abs(side[..., 0] * away[..., 1] - side[..., 1] * away[..., 0])
-        result: Array = area / np.where(length > 0, length, np.inf)
+        area = np.abs(side[..., 0] * away[..., 1] - side[..., 1] * away[..., 0]) - extent * np.abs(side).sum(axis=2)
+        return self._beside(area / np.where(length > 0, length, np.inf), window, extent)
+
+    def _beside(self, distance: Array, window: Array, extent: float) -> Array:
+        """Returns the distances (N, 3) of squares from edges, where that of an edge which ends before its square is larger.
+
+        distance: the distances (N, 3) from the lines through the edges [pixels].
+        window: x, y of the corners (T, 3, 2) in the picture [pixels].
+        extent: as for `distance`.
+        """
+        if not extent:
+            return distance
+        start, end = window[:, [1, 2, 0]], window[:, [2, 0, 1]]
+        centre = self.at[:, None, :2]
+        gap = np.maximum(np.minimum(start, end)[self.place] - centre, centre - np.maximum(start, end)[self.place]).max(axis=2)
+        result: Array = np.where(self.whole[self.place, None], np.maximum(distance, gap - extent), distance)
         return result
 
     def errors(self, corners: Array, vertex: Array | float) -> Array:
@@ -210,6 +273,35 @@ class Planes:
         corner = (self.depth_terms[:, 0] + np.abs(depth) * self.depth_terms[:, 1]) / np.abs(self.w)
         result: Array = U * (self.driver.plane * size + self.driver.window * corner) + steepness + needle
         return result
+
+    def depth_slope(self) -> Array:
+        """Returns the changes (N, 2) of the depth from a pixel to the next one to the right and to the next one below."""
+        plane: Array = np.einsum("ti,tij->tj", self.z, self.G)[self.place, :2]
+        return plane
+
+    def over_square(self, corners: Array, vertex: Array | float, extent: float) -> tuple[Array, Array, Array]:
+        """Returns (middle, half, error), (N, C) each, of attributes where squares meet the fragments' triangles.
+
+        middle and half are the middle of an attribute's range and half the range; error is the driver's error, as in `errors`.
+
+        A square lies round the centre of each fragment's pixel. An attribute a = (A . p) / (B . p) differs from its value c at
+        the centre q by (A - c B) . (p - q) / (B . p), and on the triangle it lies between its values at the corners.
+        corners, vertex: as for `errors`.
+        extent: half the side of the squares [pixels].
+        """
+        planes = np.einsum("tic,tij->tcj", corners, self.G)[self.place]
+        value = self.w[:, None] * np.einsum("ncj,nj->nc", planes, self.at)
+        slope = np.abs(planes[..., :2] - value[..., None] * self.B[:, None, :2]).sum(axis=2)
+        # B . p is 1 / w. Where it reaches 0 in the square, the plane has its horizon there, and only the corners are a limit.
+        least = 1 / self.w - extent * np.abs(self.B[:, :2]).sum(axis=1)
+        bounded = (least > 0) & ~self.flat
+        largest = 1 / np.where(bounded, least, 1.0)
+        spread = np.where(bounded, extent * largest, 0.0)[:, None] * slope
+        low, high = corners.min(axis=1)[self.place], corners.max(axis=1)[self.place]
+        error = self.errors(corners, vertex) * np.where(bounded, largest / self.w, 1.0)[:, None]
+        first = np.where(bounded[:, None], np.clip(value - spread, low, high), low)
+        last = np.where(bounded[:, None], np.clip(value + spread, low, high), high)
+        return (first + last) / 2, (last - first) / 2, error
 
     def _needle(self, planes: Array, value: Array) -> Array:
         """Returns the errors (N, C) of attributes / w that needle-like triangles cause.

@@ -27,10 +27,12 @@ Box = tuple[int, int, int, int]
 # The number of snapping steps per pixel.
 SUBPIXELS = 256
 HALF = SUBPIXELS // 2
-# If a pixel's centre is nearer to an edge than this [1/256 pixel], a driver may draw the pixel or not. A driver rounds corners
-# to float32 before it snaps them, which may move the corners and the edges between them by one step. The other two are a
-# reserve.
-MARGIN = 3.0
+# A driver moves corners, and the edges between them, by up to one step of its own grid. If a point is nearer to an edge than
+# this step and two steps of the reference's grid, a driver may cover the point or not. One of the two is for the reference's
+# own snapping and for the driver's rounding of corners to float32, and the other is a reserve [1/256 pixel].
+RESERVE = 2.0
+# The distance from an edge for a driver with the same grid as the reference's [1/256 pixel].
+MARGIN = 1.0 + RESERVE
 # The largest relative error of one float32 rounding.
 U = 2.0**-24
 # The error of a vertex's window position [roundings].
@@ -48,8 +50,9 @@ class Fragments:
     draw: the index into Inputs.draws.
     triangle: the row of the draw's triangles.
     pixel: the number of the pixel, row * width + column, row 0 at the top.
-    covered: whether the triangle covers the pixel by the fill rule.
-    partial: whether the pixel's centre is so near to an edge that a driver may decide otherwise.
+    covered: whether the triangle covers the pixel's centre by the fill rule.
+    partial: whether an edge is so near to one of the pixel's samples that a driver may leave this sample out, or cover it
+        although the reference does not.
     front: whether the front of the triangle is seen.
     depth: the depth at the pixel's centre, 1 near and 0 far.
     """
@@ -93,10 +96,11 @@ def rasterise(inputs: Inputs, margin: float = 0.0) -> Iterator[Fragments]:
     """Yields all fragments, including hidden ones, draw by draw, in pieces of about 100,000.
 
     inputs: the scene with its uploaded values.
-    margin: 0 for the covered fragments only, MARGIN for every fragment that a driver might draw [1/256 pixel].
+    margin: 0 for the fragments that cover a pixel's centre; Freedom.margin for every fragment that a driver might draw, at the
+        centre or at any other place where the pixel may have samples (Inputs.extent) [1/256 pixel].
     """
     for number, draw in enumerate(inputs.draws):
-        yield from _rasterise(draw, number, inputs.size, inputs.window, margin)
+        yield from _rasterise(draw, number, inputs, margin)
 
 
 def resolve(inputs: Inputs, parts: Iterable[Fragments], opaque: Callable[[Fragments], Flags]) -> tuple[Fragments, Fragments]:
@@ -143,15 +147,15 @@ def resolve(inputs: Inputs, parts: Iterable[Fragments], opaque: Callable[[Fragme
     return nearest, over.take(np.lexsort((over.triangle, over.draw, over.pixel)))
 
 
-def _rasterise(draw: Draw, number: int, size: tuple[int, int], window: Box, margin: float) -> Iterator[Fragments]:
+def _rasterise(draw: Draw, number: int, inputs: Inputs, margin: float) -> Iterator[Fragments]:
     """Yields the fragments of one draw.
 
     draw: the instance that is drawn.
     number: its index into Inputs.draws.
-    size: width and height of the whole picture [pixels].
-    window: x, y, width and height of the part that is rendered [pixels].
+    inputs: the scene with its uploaded values.
     margin: as for rasterise [1/256 pixel].
     """
+    size = inputs.size
     code = clip.outside(draw.clip)
     # Triangles must be clipped if they reach beyond the near or far plane, or beyond the guard band at the sides.
     cut = (clip.outside(draw.clip, clip.GUARDED) != 0) | (code & clip.DEPTH != 0)
@@ -176,7 +180,7 @@ def _rasterise(draw: Draw, number: int, size: tuple[int, int], window: Box, marg
             displaced = np.zeros(len(which))
             if exact is not None:
                 displaced = _displacement(draw.clip_terms[triangles[which]].max(axis=1), exact, size)
-            for index, x, y, covered, partial, front in _cover(polygons, window, draw, margin, displaced):
+            for index, x, y, covered, partial, front in _cover(polygons, inputs, draw, margin, displaced):
                 triangle = which[index] + start
                 depth = weights(draw, triangle, x + 0.5, y + 0.5, size, derivatives=False).depth
                 yield Fragments(
@@ -219,17 +223,18 @@ def _displacement(terms: Array, corners: Array, size: tuple[int, int]) -> Array:
 
 
 def _cover(
-    polygons: Array, window: Box, draw: Draw, margin: float, displaced: Array
+    polygons: Array, inputs: Inputs, draw: Draw, margin: float, displaced: Array
 ) -> Iterator[tuple[Indices, Indices, Indices, Flags, Flags, Flags]]:
     """Yields (polygon, x, y, covered, partial, front) of the pixels in convex polygons, in batches, ordered by polygon.
 
     polygons: the corners (P, E, 2) of P polygons with E corners each [1/256 pixel].
-    window: x, y, width and height of the part that is rendered [pixels].
+    inputs: the scene with its uploaded values.
     draw: the instance that they belong to.
     margin: as for rasterise [1/256 pixel].
     displaced: how far (P,) a driver may draw each polygon's corners beside their places, beyond the margin [1/256 pixel].
     """
     margins = margin + displaced
+    extent = inputs.extent * SUBPIXELS if margin else 0.0
     following = np.roll(polygons, -1, axis=1)
     across, down = following[..., 0] - polygons[..., 0], following[..., 1] - polygons[..., 1]
     # Twice the area, from vectors relative to the first corner, which avoids the subtraction of large numbers.
@@ -243,18 +248,19 @@ def _cover(
         drawn &= front
     if margin:
         # A triangle lower than two snapping steps may turn over, or gain an area, when a corner moves by one step.
-        thin = np.abs(area) <= (2 + displaced) * length.max(axis=1)
+        thin = np.abs(area) <= (2 * (margin - RESERVE) + displaced) * length.max(axis=1)
         front |= thin & (not draw.instance.back_faces)
         drawn |= thin
-    low = np.ceil((polygons.min(axis=1) - margins[:, None] - HALF) / SUBPIXELS)
-    high = np.floor((polygons.max(axis=1) + margins[:, None] - HALF) / SUBPIXELS)
-    corner, size = np.array(window[:2]), np.array(window[2:])
+    reach = (margins + extent)[:, None]
+    low = np.ceil((polygons.min(axis=1) - reach - HALF) / SUBPIXELS)
+    high = np.floor((polygons.max(axis=1) + reach - HALF) / SUBPIXELS)
+    corner, size = np.array(inputs.window[:2]), np.array(inputs.window[2:])
     low, high = np.maximum(low, corner), np.minimum(high, corner + size - 1)
     kept = np.flatnonzero(drawn & (low <= high).all(axis=1))
     low, high, front = low[kept], high[kept], front[kept]
     turn = np.where(area[kept] < 0, -1.0, 1.0)[:, None]
     # A centre is inside a polygon where inward . (centre - corner) > 0 for every edge.
-    edges = _Edges(polygons[kept], -down[kept] * turn, across[kept] * turn, length[kept], margins[kept])
+    edges = _Edges(polygons[kept], -down[kept] * turn, across[kept] * turn, length[kept], margins[kept], extent)
     rows = (high[:, 1] - low[:, 1] + 1).astype(np.intp)
     for row_batch in _batches(rows):
         index, step = _expanded(rows[row_batch], row_batch.start)
@@ -287,19 +293,19 @@ class _Edges:
     corner_y: y (P, E) of the edges' first corners [1/256 pixel].
     x: x (P, E) of the inward normals, which are as long as their edges.
     y: y (P, E) of the inward normals.
-    slack: the margin (P, E) times the edges' lengths.
+    slack: the margin and the reach (P, E) of a pixel's square toward the edge, both times the edge's length.
     real: whether (P, E) the edge has a length; repeated corners make edges without one.
     owns: whether (P, E) points on the edge belong to the polygon.
     """
 
-    def __init__(self, corners: Array, x: Array, y: Array, length: Array, margins: Array) -> None:
+    def __init__(self, corners: Array, x: Array, y: Array, length: Array, margins: Array, extent: float) -> None:
         """corners: (P, E, 2) [1/256 pixel]. x, y: the inward normals (P, E). length: the edges' lengths (P, E).
 
-        margins: (P,) [1/256 pixel].
+        margins: (P,) [1/256 pixel]. extent: half the side of the square in which a pixel has its samples [1/256 pixel].
         """
         self.corner_x, self.corner_y = corners[..., 0], corners[..., 1]
         self.x, self.y = x, y
-        self.slack = margins[:, None] * length
+        self.slack = margins[:, None] * length + extent * (np.abs(x) + np.abs(y))
         self.real = length > 0
         # The fill rule: the inward normal of a left edge points right, and that of a top edge points straight down.
         self.owns = ~self.real | (x > 0) | ((x == 0) & (y > 0))

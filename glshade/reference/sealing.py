@@ -11,21 +11,22 @@ from glshade.radiance.draw import Draw
 from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.inputs import Inputs
 from glshade.reference.planes import FLAT, Planes
-from glshade.reference.raster import MARGIN, SUBPIXELS, Fragments
+from glshade.reference.raster import SUBPIXELS, Fragments
 
 Flags = NDArray[np.bool_]
 Indices = NDArray[Any]
 
-# An edge within this distance of a pixel's centre counts as near where the driver's snapped corners are not known [pixels]. The
-# distance is the margin of coverage and two snapping steps for the corners of the edge.
-NEAR = (MARGIN + 2) / SUBPIXELS
+# Where the driver's snapped corners are not known, the corners of an edge may lie up to this far beside their places [steps].
+MOVED = 2
 
 
-def is_sealed(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> Flags:
-    """Returns whether each partial fragment (N,) belongs to a surface that covers its pixel's centre without a gap.
+def sheets(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> Indices:
+    """Returns the number (N,) of the sheet that each partial fragment belongs to, from 0; -1 if it belongs to none.
+
+    A sheet is a part of a surface that covers the samples of one pixel without a gap. Its fragments are called sealed.
 
     Two triangles on either side of a shared edge leave no gap there, whichever of them the driver draws. So a fragment is
-    sealed if each edge near its pixel's centre has a sealed fragment of that pixel on its other side. A triangle that snapping
+    sealed if each edge near its pixel's samples has a sealed fragment of that pixel on its other side. A triangle that snapping
     may turn over belongs to a surface of either facing: the surface is continuous, however its corners are snapped, so where a
     triangle is turned over, its neighbours overlap.
     """
@@ -37,7 +38,7 @@ def is_sealed(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) 
             continue
         part = fragments.take(indices)
         planes = Planes(draw, part, inputs.size, driver)
-        near, certain = _near(planes)
+        near, certain = _near(planes, inputs.extent)
         # Each fragment takes part with the facing that it shows, and with the other one if it may be turned over.
         turned = np.flatnonzero(planes.thin[planes.place]) if draw.instance.back_faces else np.empty(0, dtype=np.intp)
         which = np.concatenate([np.arange(len(part)), turned])
@@ -50,31 +51,40 @@ def is_sealed(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) 
         possible.append(certain[which])
         edges.append(np.column_stack([edge[:, 0] + count, edge[:, 1:], np.full(len(edge), number)]))
         count += len(which)
-    sealed = np.zeros(len(fragments), dtype=np.bool_)
+    result = np.full(len(fragments), -1)
     if owners:
-        kept = _closed(np.concatenate(edges), np.concatenate(twins), np.concatenate(possible))
-        sealed[np.concatenate(owners)[kept]] = True
-    return sealed
+        edge, twin = np.concatenate(edges), np.concatenate(twins)
+        edge = np.column_stack([edge[:, :2], _numbered(edge[:, 2:])])
+        kept = _closed(edge, twin, np.concatenate(possible))
+        result[np.concatenate(owners)[kept]] = _connected(edge, twin, kept)[kept]
+    return result
 
 
-def _near(planes: Planes) -> tuple[Flags, Flags]:
+def _near(planes: Planes, extent: float) -> tuple[Flags, Flags]:
     """Returns (near (N, 3), certain (N,)) of fragments.
 
-    near: whether each edge is near the pixel's centre; edge i is opposite corner i.
+    near: whether each edge is near a place where the pixel may have samples; edge i is opposite corner i.
     certain: whether the fragment has a near edge, and no other reason why a driver may leave it out.
+    extent: half the side of the square round the pixel's centre in which the pixel has its samples [pixels].
     """
+    driver = planes.driver
+    margin = driver.margin / SUBPIXELS
     thin = planes.thin[planes.place]
     # The far edge of a thin triangle counts as near, too.
-    reserve = np.where(thin, FLAT, 0.0)
-    distance = NEAR + planes.reach.max(axis=1)
+    reserve = np.where(thin, FLAT * driver.step, 0.0)
+    # The margin of coverage, the snapping of the edge's corners, and the error of their places before that.
+    distance = margin + MOVED * driver.step + planes.reach.max(axis=1)
+    # The reference snaps corners as a driver does that has a grid of the same size, so that they are known.
+    known = planes.whole[planes.place] & (planes.reach.max(axis=1) < driver.step) & (driver.step <= 1 / SUBPIXELS)
     near = np.where(
-        (planes.whole[planes.place] & (distance < NEAR + 1 / SUBPIXELS))[:, None],
-        planes.snapped_distance() <= (MARGIN / SUBPIXELS + reserve)[:, None],
-        planes.distance() <= (distance + reserve)[:, None],
+        known[:, None],
+        planes.snapped_distance(extent) <= (margin + reserve)[:, None],
+        planes.distance(extent) <= (distance + reserve)[:, None],
     )
     # Where a driver clips a triangle, the new edge is also only drawn to within the distance of the picture's border.
     centre = planes.at[:, :2]
-    border = planes.clipped[planes.place] & (np.minimum(centre, planes.size - centre) <= distance[:, None]).any(axis=1)
+    inward = np.minimum(centre, planes.size - centre) - extent
+    border = planes.clipped[planes.place] & (inward <= distance[:, None]).any(axis=1)
     return near, near.any(axis=1) & ~border & ~planes.flat
 
 
@@ -105,14 +115,12 @@ def _closed(edges: Indices, twin: Indices, possible: Flags) -> Flags:
     """Returns the participants (M,) whose every near edge has another one on its other side.
 
     All possible ones count at first. Those with an edge that has none on its other side are removed, until all are closed.
-    edges: the rows of `_edges`, followed by the number of the draw.
+    edges: rows (holder, direction, number of the edge in its pixel).
     twin: the participant (M,) of the same fragment with the other facing, -1 if there is none. It does not count as another
         one, although it runs along the edge in the other direction.
     possible: whether (M,) the participant may be sealed at all.
     """
-    holder, direction = edges[:, 0], edges[:, 1]
-    _, edge = np.unique(edges[:, 2:], axis=0, return_inverse=True)
-    edge = edge.reshape(-1)
+    holder, direction, edge = edges.T
     kept = possible.copy()
     while True:
         current = kept[holder]
@@ -123,3 +131,34 @@ def _closed(edges: Indices, twin: Indices, possible: Flags) -> Flags:
         if not lonely.any():
             return kept
         kept[holder[lonely]] = False
+
+
+def _connected(edges: Indices, twin: Indices, kept: Flags) -> Indices:
+    """Returns a number (M,) for each participant; those that are connected by shared edges have the same number.
+
+    edges, twin: as for `_closed`.
+    kept: whether (M,) the participant is sealed. The others connect nothing.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    holder, _, edge = edges[kept[edges[:, 0]]].T
+    pair = np.flatnonzero((twin >= 0) & kept & kept[twin])
+    # Each edge is a node beside the participants that hold it.
+    count = len(twin) + int(edges[:, 2].max(initial=-1)) + 1
+    first, second = np.concatenate([holder, pair]), np.concatenate([len(twin) + edge, twin[pair]])
+    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(count, count))
+    result: Indices = connected_components(graph, directed=False)[1][: len(twin)]
+    return result
+
+
+def _numbered(rows: Indices) -> Indices:
+    """Returns a number (N,) for each row (N, C) of whole numbers from 0; equal rows have equal numbers.
+
+    Sorting one column after the other is much faster than sorting whole rows. The numbers of rows, of pixels and of corners are
+    so small that their products fit into 63 bits.
+    """
+    result = np.zeros(len(rows), dtype=np.int64)
+    for column in rows.T:
+        _, result = np.unique(result * (int(column.max(initial=0)) + 1) + column, return_inverse=True)
+    return result

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import base64
 import csv
 import io
 import json
 import math
 import re
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from functools import cached_property
@@ -19,15 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.errors import GlshadeError
-from glshade.files import replacing
 from glshade.image.image import Image
 from glshade.image.metrics import METRICS
+from glshade.page import template
+from glshade.page.ramp import LEAST, heat
+from glshade.page.small import as_base64, smaller
 from glshade.scene.scene import Scene
 from glshade.tradeoff.front import ties
 from glshade.tradeoff.setting import KINDS, Setting
 from glshade.tradeoff.study import Pictures, Point, Study
-from glshade.verification.report import LEAST, RAMP, heat
-from glshade.version import __version__
 
 if TYPE_CHECKING:
     from glshade.gl.renderer import Renderer
@@ -48,7 +46,7 @@ KIND_MEANINGS = {
     "arithmetic": "float32, faster forms",
     "storage": "format of the picture",
 }
-# The largest width of the pictures in the page [pixels].
+# The largest width and height of the pictures in the page [pixels].
 WIDTH = 320
 # The largest size of a page, which is small enough for e-mail, and the size of one point without its pictures [bytes].
 PAGE, POINT = 4_500_000, 4_000
@@ -132,10 +130,10 @@ def write(folder: Path, study: Study, scene: Scene, renderer: Renderer, metric: 
         pictures.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise GlshadeError(f"{error.filename}: cannot be made: {error.strerror}") from None
-    _write(folder / "tradeoff.json", json.dumps(study.as_dict(), indent=1, allow_nan=False) + "\n")
-    _write(folder / "tradeoff.csv", table(study))
+    template.write(folder / "tradeoff.json", json.dumps(study.as_dict(), indent=1, allow_nan=False) + "\n")
+    template.write(folder / "tradeoff.csv", table(study))
     page = folder / "index.html"
-    _write(page, html(study, scene, metric, _pictures(pictures, study, scene, renderer)))
+    template.write(page, html(study, scene, metric, _pictures(pictures, study, scene, renderer)))
     return page
 
 
@@ -164,17 +162,6 @@ def html(study: Study, scene: Scene, metric: str, pictures: dict[int, dict[str, 
     pictures: index of a point -> its pictures, for points that have some: `picture` and `error` (the error map) are JPEG files
         in base64, and `file` is the name of the PNG file in pictures/ without the suffix.
     """
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    environment = Environment(
-        loader=FileSystemLoader(Path(__file__).parent),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    # Do not sort the kinds of errors: their order has a meaning, because each kind builds on the one before.
-    environment.policies["json.dumps_kwargs"] = {"sort_keys": False}
     fronts = {name: study.front(name) for name in METRICS}
     data = [
         {
@@ -192,10 +179,13 @@ def html(study: Study, scene: Scene, metric: str, pictures: dict[int, dict[str, 
         for i, p in enumerate(study.points)
     ]
     exact = study.points[0]
-    return environment.get_template("page.html.j2").render(
+    here = Path(__file__).parent
+    return template.render(
+        here / "page.html.j2",
+        [here / "page.css"],
+        [here / "page.js"],
         study=study,
         description=scene.description,
-        version=__version__,
         metric=metric,
         metrics=METRIC_MEANINGS,
         kinds=KIND_MEANINGS,
@@ -208,7 +198,6 @@ def html(study: Study, scene: Scene, metric: str, pictures: dict[int, dict[str, 
         bar=bar,
         floor_text={m: error_text(getattr(study.floor, m), m) for m in METRICS},
         floor_bar={m: bar(getattr(study.floor, m)) for m in METRICS},
-        ramp=", ".join(f"rgb({int(r)} {int(g)} {int(b)})" for r, g, b in RAMP),
         least=error_text(LEAST),
         greatest=error_text(_greatest(study)),
     )
@@ -393,51 +382,11 @@ def _pictures(folder: Path, study: Study, scene: Scene, renderer: Renderer) -> d
         if i in front:
             name = re.sub(r"[^a-z0-9.]+", "-", str(setting))
             Image(np.ascontiguousarray(picture, dtype=np.float32)).save(folder / f"{name}.png")
-            Image(_heat(error, greatest), "srgb").save(folder / f"{name}-error.png")
+            Image(heat(error, greatest)[0], "srgb").save(folder / f"{name}-error.png")
             embedded[i]["file"] = name
         if room > 0:
-            small = Image(_smaller(picture, np.add)).encoded()
-            heated = Image(_heat(_smaller(error, np.maximum), greatest), "srgb")
-            embedded[i] |= {"picture": _jpeg(small), "error": _jpeg(heated)}
+            small = Image(smaller(picture, np.add, WIDTH)).encoded()
+            heated = heat(smaller(error, np.maximum, WIDTH), greatest)[0]
+            embedded[i] |= {"picture": as_base64(small.pixels[..., :3], "jpg"), "error": as_base64(heated, "jpg")}
             room -= (len(embedded[i]["picture"]) + len(embedded[i]["error"])) * 3 // 4
     return embedded
-
-
-def _heat(error: Array, greatest: float) -> Array:
-    """Returns the map (H, W, 3) uint8 of errors (H, W), on a scale up to `greatest`."""
-    # heat() takes the scale from the largest error. So a row with the greatest error is added, and removed from the result.
-    return heat(np.vstack([error, np.full_like(error[:1], greatest)]))[0][:-1]
-
-
-def _smaller(picture: Array, gather: np.ufunc) -> Array:
-    """Returns a picture reduced by a whole factor, so that it is at most WIDTH pixels wide.
-
-    picture: (H, W, ...), with any number of further axes.
-    gather: np.add to average the pixels that become one, np.maximum to take the largest of them.
-    """
-    step = -(-picture.shape[1] // WIDTH)
-    if step == 1:
-        return picture
-    places = [np.arange(0, size, step) for size in picture.shape[:2]]
-    result: Array = gather.reduceat(gather.reduceat(picture, places[0], axis=0), places[1], axis=1)
-    if gather is np.add:
-        rows, columns = (np.diff(np.append(place, size)) for place, size in zip(places, picture.shape, strict=False))
-        result = (result / (rows[:, None] * columns)[..., None]).astype(np.float32)
-    return result
-
-
-def _jpeg(image: Image) -> str:
-    """Returns an image as a JPEG file in base64."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "picture.jpg"
-        image.save(path)
-        return base64.b64encode(path.read_bytes()).decode("ascii")
-
-
-def _write(path: Path, text: str) -> None:
-    """Writes a text file, whole or not at all. Errors: GlshadeError."""
-    try:
-        with replacing(path) as temporary:
-            temporary.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise GlshadeError(f"{path}: cannot be written: {error.strerror}") from None

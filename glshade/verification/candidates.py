@@ -1,4 +1,8 @@
-"""Candidates: the values that the float64 reference allows each pixel of a picture to have."""
+"""Candidates: the values that the float64 reference allows each pixel of a picture to have.
+
+A film with one sample a pixel is one picture. Supersampling, and more samples than a driver offers at once, average several
+pictures that are shifted within the pixel; their intervals are averaged, too.
+"""
 
 from __future__ import annotations
 
@@ -9,24 +13,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.arrays import group_starts
-from glshade.reference.bounds import TINY, Bounds, alphas, fragment_bounds
+from glshade.reference.bounds import TINY, Bounds, fragment_bounds
 from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.inputs import Inputs, prepare
-from glshade.reference.planes import depth_slack, may_turn
-from glshade.reference.raster import MARGIN, Fragments, rasterise
-from glshade.reference.sealing import is_sealed
+from glshade.reference.raster import Fragments
+from glshade.scene.film import Film
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
-from glshade.verification.judgement import Expected, PixelClass, classify
+from glshade.verification.judgement import Expected, PixelClass
+from glshade.verification.pieces import Visible, visible
 
 Array = NDArray[Any]
 Flags = NDArray[np.bool_]
+Indices = NDArray[np.intp]
 
-# If a candidate's interval is wider than this share of the picture's brightest value, its pixel is not decided.
+# If a candidate's interval is wider than this share of the picture's brightest value, its pixel is not decided. Surfaces that
+# meet in a pixel of several samples agree if the hull of their values is not wider than that.
 WIDE = 0.1
 # In a picture that is almost black, this share of the brightest light that arrives at a surface counts as the brightest value:
 # what remains is the rounding error of light that cancels, or that only just reaches a surface.
 DIM = 1e-3
+# The roundings of a mean of up to 8 samples in float32, with a reserve. One rounding has a relative error of 2^-24 at most.
+MEAN = 16 * 2.0**-24
+# OpenGL 3.3 requires drivers to offer this many samples per pixel in one picture.
+OFFERED = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,78 +46,284 @@ class Candidates:
     A candidate is one such value, with its bounds. A pixel has several candidates if a driver may show one of several surfaces.
 
     inputs: the scene, made ready for the reference.
+    film: the film of the scene.
     expected: the N candidates in the form that `judge` takes.
-    fragments: the M fragments of opaque surfaces, sorted by pixel. Their pixel numbers count the pixels of the whole picture,
-        while all other pixel numbers count the pixels of the crop.
-    bounds: the bounds of the values of the M fragments.
-    base: (N,), the index of the opaque fragment that each candidate belongs to; -1 for a candidate of blended layers directly
-        over the background.
-    picture: (H, W, 4), the reference's picture [linear, premultiplied].
+    draw: (N,), the index into Inputs.draws of the surface that each candidate belongs to; -1 for the background.
+    triangle: (N,), the row of that draw's triangles; -1 for the background.
+    picture: (H, W, 4), the reference's picture [linear, premultiplied]; uint8 for candidates of an 8-bit picture.
+    straight: the least and the largest colours (N, 3) of the candidates without alpha [linear]; None if they follow from
+        `expected`, because the background is opaque.
+    driver: the freedom of the driver that the candidates are for.
+    encoding: the encoding of an 8-bit picture (codes.py); empty for linear light.
     """
 
     inputs: Inputs
+    film: Film
     expected: Expected
-    fragments: Fragments
-    bounds: Bounds
-    base: NDArray[np.intp]
+    draw: Indices
+    triangle: Indices
     picture: Array
+    straight: tuple[Array, Array] | None
+    driver: Freedom
+    encoding: str = ""
+
+    def owner(self, candidate: int) -> tuple[str, int]:
+        """Returns the name of a candidate's object, and its triangle; ("background", -1) for the background."""
+        number = int(self.draw[candidate]) if candidate >= 0 else -1
+        if number < 0:
+            return "background", -1
+        return self.inputs.draws[number].instance.name, int(self.triangle[candidate])
 
 
 def find_candidates(scene: Scene, *, shading: Rate | None = None, driver: Freedom = LLVMPIPE) -> Candidates:
-    """Returns the values that a picture of the scene may have.
+    """Returns the values that a picture of the scene may have, with the samples that its film asks for.
 
     shading: the shading rate for the whole scene; by default, each object has its own.
     driver: the freedom that the specification leaves to the driver.
-    Errors: SceneError.
+    Errors: SceneError; NoReference for a reflectance model that has only a GLSL file.
     """
+    film = scene.film
     inputs = prepare(scene, shading)
-    width, height = inputs.size
-    solid, layers, classes, open_, hidden = _classified(inputs, driver)
-    bounds = fragment_bounds(inputs, solid.fragments, driver)
-    over = layers.take(layers.fragments.depth + layers.slack >= hidden[layers.fragments.pixel])
-    over = over.take(np.lexsort((over.fragments.triangle, over.fragments.draw, over.fragments.pixel)))
-    over_bounds = fragment_bounds(inputs, over.fragments, driver)
+    offsets = _offsets(film, driver)
+    if len(offsets) == 1:
+        shown = _shown(inputs, _freedom(film, driver))
+    else:
+        shown = _averaged(inputs, offsets, driver)
+    wanted = inputs.wanted.reshape(-1)
+    # Outside of the window there are no fragments, so that all candidates lie inside.
+    pixel = np.searchsorted(wanted, shown.pixel)
+    expected = Expected(
+        inputs.window[2:],
+        inputs.background,
+        shown.classes[wanted],
+        shown.open[wanted],
+        pixel,
+        shown.low,
+        shown.high,
+        shown.centre,
+        mixed=film.pictures > 1,
+    )
+    picture = np.broadcast_to(inputs.background, (len(wanted), 4)).copy()
+    first = group_starts(pixel)
+    picture[pixel[first]] = shown.centre[first]
+    width, height = inputs.window[2:]
+    picture = picture.reshape(height, width, 4)
+    colours = None if inputs.background[3] == 1 else (shown.straight_low, shown.straight_high)
+    return Candidates(inputs, film, expected, shown.draw, shown.triangle, picture, colours, driver)
+
+
+def _offsets(film: Film, driver: Freedom) -> list[tuple[float, float]]:
+    """Returns the offsets (right, down) of the pictures whose mean is the film's picture [pixels].
+
+    They are those of the renderer (glshade/gl/tiles.py). A driver that is not known is taken to offer all samples at once.
+    """
+    if film.pictures == 1:
+        return [(0.0, 0.0)]
+    from glshade.gl.tiles import passes
+
+    return passes(film, driver.samples or film.samples)
+
+
+def _freedom(film: Film, driver: Freedom) -> Freedom:
+    """Returns the freedom of a driver that may draw the film's samples in several pictures, shifted within the pixel."""
+    if driver.samples or film.samples <= OFFERED:
+        return driver
+    # Two pictures of 4 samples are shifted by 1/16 pixel in both directions, and each is shaded at its own pixels' centres.
+    return replace(driver, snap=driver.snap + 0.5 / film.samples)
+
+
+@dataclass(frozen=True, eq=False)
+class _Shown:
+    """The N candidates of a whole picture of P pixels, before any crop.
+
+    classes: the PixelClass (P,) of each pixel.
+    open: (P,), True where the background is accepted as well.
+    pixel: (N,), ascending, the pixel of each candidate.
+    low, high, centre: (N, 4) each, the two ends of each candidate's interval, and the reference's own value.
+    straight_low, straight_high: (N, 3) each, the two ends of the colours without alpha.
+    draw, triangle: (N,) each, as in Candidates.
+    widest: the width of an interval up to which it determines its pixel's value [linear].
+    """
+
+    classes: NDArray[np.uint8]
+    open: Flags
+    pixel: Indices
+    low: Array
+    high: Array
+    centre: Array
+    straight_low: Array
+    straight_high: Array
+    draw: Indices
+    triangle: Indices
+    widest: float
+
+
+def _shown(inputs: Inputs, driver: Freedom) -> _Shown:
+    """Returns the candidates of one picture."""
+    seen = visible(inputs, driver)
+    classes, open_ = seen.classes.copy(), seen.open.copy()
+    solid, over = seen.solid.fragments, seen.layers.fragments
+    bounds, over_bounds = (
+        fragment_bounds(inputs, pieces.fragments, driver, pieces.anywhere) for pieces in (seen.solid, seen.layers)
+    )
     brightest = max((float(np.abs(b.value).max(initial=0.0)) for b in (bounds, over_bounds)), default=0.0)
+    arriving = max((float(b.arriving.max(initial=0.0)) for b in (bounds, over_bounds)), default=0.0)
     scale = min(1.0, brightest)
+    # A scene without light is black, up to the smallest numbers of float32.
+    widest = WIDE * max(brightest, DIM * arriving, 100 * TINY)
     low, high = bounds.interval(scale)
-    pixel, base, centre = solid.fragments.pixel, np.arange(len(solid.fragments)), bounds.centre()
-    agreed = _agreeing(width * height, pixel, low, high, open_, inputs.background)
-    classes[agreed & np.isin(classes, (PixelClass.SILHOUETTE, PixelClass.TIE))] = PixelClass.SEAM
-    if len(over.fragments):
+    pixel, centre = solid.pixel, bounds.centre()
+    draw, triangle = solid.draw.astype(np.intp), solid.triangle.astype(np.intp)
+    if inputs.extent:
+        # A triangle that a driver cuts into several is shaded for each of them.
+        classes[pixel[seen.solid.anywhere & (classes[pixel] == PixelClass.INTERIOR)]] = PixelClass.SEAM
+        # Where no surface covers the pixel's centre, the reference's own picture shows the background there.
+        centre[~solid.covered & open_[pixel]] = inputs.background
+    else:
+        agreed = _agreeing(len(classes), pixel, low, high, open_, inputs.background)
+        classes[agreed & np.isin(classes, (PixelClass.SILHOUETTE, PixelClass.TIE))] = PixelClass.SEAM
+    if len(over):
         # Blended layers lie over opaque surfaces. Where the background may be visible, they may also lie directly over it.
-        bare = np.zeros(width * height, dtype=np.bool_)
-        bare[over.fragments.pixel] = True
+        bare = np.zeros(len(classes), dtype=np.bool_)
+        bare[over.pixel] = True
         bare &= open_ | (classes == PixelClass.BACKGROUND)
         extra = np.flatnonzero(bare)
         background = np.broadcast_to(inputs.background, (len(extra), 4))
         order = np.argsort(np.concatenate([pixel, extra]), kind="stable")
         pixel = np.concatenate([pixel, extra])[order]
-        base = np.concatenate([base, np.full(len(extra), -1)])[order]
+        draw, triangle = (np.concatenate([part, np.full(len(extra), -1)])[order] for part in (draw, triangle))
         low, high, centre = (np.concatenate([part, background])[order] for part in (low, high, centre))
-        nearest = np.full(width * height, -np.inf)
-        np.maximum.at(nearest, solid.fragments.pixel, solid.fragments.depth + solid.slack)
-        doubtful = over.partial | (over.fragments.depth - over.slack <= nearest[over.fragments.pixel])
-        _compose(pixel, low, high, centre, over.fragments, over_bounds, doubtful, scale)
-        uncertain = np.unique(over.fragments.pixel[doubtful])
-        layered = np.unique(over.fragments.pixel)
+        doubtful = _doubtful(seen)
+        _compose(pixel, low, high, centre, over, over_bounds, doubtful, scale)
+        uncertain, layered = np.unique(over.pixel[doubtful]), np.unique(over.pixel)
         background_alone = classes[layered] == PixelClass.BACKGROUND
         classes[layered] = np.where(background_alone, PixelClass.INTERIOR, classes[layered])
         classes[uncertain] = PixelClass.SILHOUETTE
         # The candidates of these pixels include the bare background already.
         open_[layered] = False
-    arriving = max((float(b.arriving.max(initial=0.0)) for b in (bounds, over_bounds)), default=0.0)
-    # A scene without light is black, up to the smallest numbers of float32.
-    widest = WIDE * max(brightest, DIM * arriving, 100 * TINY)
-    classes[pixel[(high - low > widest).any(axis=1)]] = PixelClass.WIDE
-    picture = np.broadcast_to(inputs.background, (width * height, 4)).copy()
-    first = group_starts(pixel)
-    picture[pixel[first]] = centre[first]
-    wanted = inputs.wanted.reshape(-1)
-    size = inputs.window[2:]
-    expected = Expected(
-        size, inputs.background, classes[wanted], open_[wanted], np.searchsorted(wanted, pixel), low, high, centre
+    shown = _Shown(classes, open_, pixel, low, high, centre, *straight(low, high), draw, triangle, widest)
+    if inputs.extent:
+        shown = _merged(shown, inputs.background)
+    wide = np.zeros(len(classes), dtype=np.bool_)
+    wide[shown.pixel[(shown.high - shown.low > widest).any(axis=1)]] = True
+    shown.classes[wide & (shown.classes != PixelClass.EDGE)] = PixelClass.WIDE
+    return shown
+
+
+def _doubtful(seen: Visible) -> Flags:
+    """Returns whether a driver may leave out each blended fragment at one of its pixel's samples."""
+    nearest = np.full(len(seen.classes), -np.inf)
+    np.maximum.at(nearest, seen.solid.fragments.pixel, seen.solid.depths.nearest)
+    return seen.layers.partial | (seen.layers.depths.farthest <= nearest[seen.layers.fragments.pixel])
+
+
+def _merged(shown: _Shown, background: Array) -> _Shown:
+    """Returns the candidates of a picture with one for each pixel: the hull of all that the pixel's samples may show.
+
+    The mean of several samples lies in the hull of their values, channel by channel.
+    background: (4,).
+    """
+    start = group_starts(shown.pixel)
+    if not len(start):
+        return shown
+    pixel = shown.pixel[start]
+    low, high = np.minimum.reduceat(shown.low, start), np.maximum.reduceat(shown.high, start)
+    bare = shown.open[pixel, None]
+    low, high = np.where(bare, np.minimum(low, background), low), np.where(bare, np.maximum(high, background), high)
+    # The colour of a mean without its alpha is a mean, weighted with alpha, of the samples' colours without theirs.
+    (behind,), _ = straight(background[None], background[None])
+    colours = np.minimum.reduceat(shown.straight_low, start), np.maximum.reduceat(shown.straight_high, start)
+    agreed = (high - low <= shown.widest).all(axis=1)
+    classes = shown.classes.copy()
+    mixed = ~np.isin(classes[pixel], (PixelClass.INTERIOR, PixelClass.WIDE))
+    classes[pixel[mixed]] = np.where(agreed, PixelClass.SEAM, PixelClass.EDGE)[mixed]
+    rounding = MEAN * np.maximum(np.abs(low), np.abs(high))
+    return replace(
+        shown,
+        classes=classes,
+        open=np.zeros_like(shown.open),
+        pixel=pixel,
+        low=low - rounding,
+        high=high + rounding,
+        centre=np.clip(shown.centre[start], low, high),
+        straight_low=np.where(bare, np.minimum(colours[0], behind), colours[0]),
+        straight_high=np.where(bare, np.maximum(colours[1], behind), colours[1]),
+        draw=shown.draw[start],
+        triangle=shown.triangle[start],
     )
-    return Candidates(inputs, expected, solid.fragments, bounds, base, picture[inputs.wanted])
+
+
+def _averaged(inputs: Inputs, offsets: list[tuple[float, float]], driver: Freedom) -> _Shown:
+    """Returns the candidates of the mean of several pictures, which are shifted within the pixel: one for each pixel.
+
+    The mean of values lies in the mean of their intervals. The pictures are taken one after the other, so that only one of them
+    is in memory.
+    offsets: the offsets (right, down) of the pictures [pixels].
+    """
+    count = inputs.size[0] * inputs.size[1]
+    low, high, centre = (np.zeros((count, 4)) for _ in range(3))
+    (behind,), _ = straight(inputs.background[None], inputs.background[None])
+    colours = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    draw, triangle = np.full(count, -1), np.full(count, -1)
+    bare, interior, wide = np.ones(count, dtype=np.bool_), np.ones(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+    widest = 0.0
+    for right, down in offsets:
+        shifted = inputs.shifted(right, down)
+        shown = _shown(shifted, driver)
+        shown = shown if inputs.extent else _merged(shown, inputs.background)
+        for total, part in ((low, shown.low), (high, shown.high), (centre, shown.centre)):
+            total += inputs.background
+            total[shown.pixel] += part - inputs.background
+        shows = np.zeros(count, dtype=np.bool_)
+        shows[shown.pixel] = True
+        for bound, ends, part in ((np.minimum, colours[0], shown.straight_low), (np.maximum, colours[1], shown.straight_high)):
+            ends[~shows] = bound(ends[~shows], behind)
+            ends[shown.pixel] = bound(ends[shown.pixel], part)
+        new = draw[shown.pixel] < 0
+        draw[shown.pixel[new]], triangle[shown.pixel[new]] = shown.draw[new], shown.triangle[new]
+        bare &= shown.classes == PixelClass.BACKGROUND
+        interior &= shown.classes == PixelClass.INTERIOR
+        wide |= shown.classes == PixelClass.WIDE
+        widest = max(widest, shown.widest)
+    for total in (low, high, centre):
+        total /= len(offsets)
+    rounding = MEAN * np.maximum(np.abs(low), np.abs(high))
+    low, high = low - rounding, high + rounding
+    classes = np.where((high - low <= widest).all(axis=1), PixelClass.SEAM, PixelClass.EDGE).astype(np.uint8)
+    for kind, flags in ((PixelClass.INTERIOR, interior), (PixelClass.WIDE, wide), (PixelClass.BACKGROUND, bare)):
+        classes[flags] = kind
+    pixel = np.flatnonzero(~bare)
+    return _Shown(
+        classes,
+        np.zeros(count, dtype=np.bool_),
+        pixel,
+        low[pixel],
+        high[pixel],
+        centre[pixel],
+        colours[0][pixel],
+        colours[1][pixel],
+        draw[pixel],
+        triangle[pixel],
+        widest,
+    )
+
+
+def straight(low: Array, high: Array) -> tuple[Array, Array]:
+    """Returns the least and the largest colours (N, 3) without alpha for intervals of premultiplied colours.
+
+    A colour without any alpha is 0.
+    low, high: the two ends (N, 4) of the intervals [linear, premultiplied].
+    """
+    least, largest = np.maximum(low[:, 3:], 0), high[:, 3:]
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+        ends = [
+            np.where(alpha > 0, colour / alpha, np.where(colour > 0, np.inf, 0.0))
+            for colour in (low[:, :3], high[:, :3])
+            for alpha in (least, largest)
+        ]
+    clear = least <= 0
+    lowest, highest = np.minimum(ends[0], ends[1]), np.maximum(ends[2], ends[3])
+    return np.where(clear, np.minimum(lowest, 0.0), lowest), np.where(clear, np.maximum(highest, 0.0), highest)
 
 
 def _agreeing(size: int, pixel: Array, low: Array, high: Array, open_: Flags, background: Array) -> Flags:
@@ -139,149 +355,48 @@ def surfaces(scene: Scene, *, driver: Freedom = LLVMPIPE) -> tuple[NDArray[np.in
     certain: True where every driver must show the nearest object.
     Errors: SceneError.
     """
-    inputs = prepare(single_sample(scene))
+    inputs = prepare(one_sample(scene))
     width, height = inputs.size
-    solid, layers, classes, _, _ = _classified(inputs, driver)
+    seen = visible(inputs, driver)
+    fragments, layers = seen.solid.fragments, seen.layers
     nearest = np.full(width * height, -1, dtype=np.intp)
     # The fragments are assigned from the farthest to the nearest, so that the nearest one overwrites the others.
-    order = np.argsort(solid.fragments.depth, kind="stable")
+    order = np.argsort(fragments.depth, kind="stable")
     numbers = np.array([draw.instance.number for draw in inputs.draws], dtype=np.intp)
-    nearest[solid.fragments.pixel[order]] = numbers[solid.fragments.draw[order]]
+    nearest[fragments.pixel[order]] = numbers[fragments.draw[order]]
     # Seams are not certain: where two objects share an edge, a driver may draw either.
-    certain = np.isin(classes, (PixelClass.BACKGROUND, PixelClass.INTERIOR))
+    certain = np.isin(seen.classes, (PixelClass.BACKGROUND, PixelClass.INTERIOR))
     certain[layers.fragments.pixel[layers.partial]] = False
     return nearest[inputs.wanted], certain[inputs.wanted]
 
 
-def _classified(inputs: Inputs, driver: Freedom) -> tuple[_Pieces, _Pieces, Array, Flags, Array]:
-    """Returns (opaque, blended, classes, open, hidden) of a whole picture of P pixels, before any crop.
-
-    opaque: the fragments of opaque surfaces that may be visible, sorted by pixel, as pieces.
-    blended: the fragments of blended surfaces that may be visible, as pieces.
-    classes, open, hidden: (P,) each, as `classify` returns them.
-    """
-    width, height = inputs.size
-    solid, layers = _visible(inputs, driver)
-    kept, classes, open_, hidden = classify(
-        width * height, solid.fragments.pixel, solid.fragments.depth, solid.slack, solid.partial, solid.sealed
-    )
-    solid = solid.take(kept)
-    return solid.take(np.argsort(solid.fragments.pixel, kind="stable")), layers, classes, open_, hidden
-
-
-def single_sample(scene: Scene) -> Scene:
-    """Returns the scene with one sample a pixel, stored as float32, shaded exactly: what the reference has bounds for."""
-    film = scene.film.model_copy(update={"samples": 1, "supersample": 1})
+def judgeable(scene: Scene) -> Scene:
+    """Returns the scene stored as float32 and shaded exactly, which is what the reference has bounds for."""
     exact = {"normalise": None, "arithmetic": None}
     objects = tuple(
         item.model_copy(update={"quality": item.quality.model_copy(update=exact)}) if item.quality else item
         for item in scene.objects
     )
     quality = scene.quality.model_copy(update={"storage": None, **exact})
-    return scene.model_copy(update={"film": film, "objects": objects, "quality": quality})
+    return scene.model_copy(update={"objects": objects, "quality": quality})
+
+
+def one_sample(scene: Scene) -> Scene:
+    """Returns the scene with one sample a pixel, and otherwise as `judgeable` does."""
+    film = scene.film.model_copy(update={"samples": 1, "supersample": 1})
+    return judgeable(scene.model_copy(update={"film": film}))
 
 
 def left_out(scene: Scene) -> tuple[str, ...]:
-    """Returns the settings of a scene that `single_sample` takes away, each as "name = value", because they are not judged."""
-    film, quality = scene.film, scene.quality
+    """Returns the settings of a scene that `judgeable` takes away, each as "name = value", because they are not judged."""
+    quality = scene.quality
     qualities = [quality, *(item.quality for item in scene.objects if item.quality)]
     settings = [
-        (film.samples > 1, f"film.samples = {film.samples}"),
-        (film.supersample > 1, f"film.supersample = {film.supersample}"),
         (quality.storage is not None, f"quality.storage = {quality.storage}"),
         (any(q.normalise is False for q in qualities), "quality.normalise = false"),
         (any(q.arithmetic == "fast" for q in qualities), "quality.arithmetic = fast"),
     ]
     return tuple(text for is_set, text in settings if is_set)
-
-
-@dataclass(frozen=True, eq=False)
-class _Pieces:
-    """N fragments, and the freedom that a driver has in drawing each of them.
-
-    fragments: the N fragments.
-    slack: (N,), the largest difference between the driver's depth and the reference's.
-    partial: (N,), True where a driver may leave the fragment out.
-    sealed: (N,), True for a partial fragment if it and others together certainly cover the pixel.
-    """
-
-    fragments: Fragments
-    slack: Array
-    partial: Flags
-    sealed: Flags
-
-    def take(self, which: Any) -> _Pieces:
-        """Returns the pieces that an index array or a mask selects."""
-        return _Pieces(self.fragments.take(which), self.slack[which], self.partial[which], self.sealed[which])
-
-
-def _visible(inputs: Inputs, driver: Freedom) -> tuple[_Pieces, _Pieces]:
-    """Returns (opaque, blended): the pieces that may be visible. Hidden pieces are dropped early to save memory."""
-    width, height = inputs.size
-    hidden = np.full(width * height, -np.inf)
-    modes = np.array([draw.alpha_mode for draw in inputs.draws])
-    parts: dict[bool, list[tuple[Fragments, Array]]] = {False: [], True: []}
-    for part in rasterise(inputs, MARGIN):
-        # A cheap first test with a fixed depth margin drops most hidden fragments before their slack is computed.
-        part = part.take(part.depth + 1e-6 >= hidden[part.pixel])
-        slack = depth_slack(inputs, part, driver)
-        # Fragments in front of the near plane or behind the far plane are not drawn. If a fragment is nearer to a plane than
-        # its slack, a driver may draw it or not.
-        inside = (part.depth + slack >= 0) & (part.depth - slack <= 1)
-        clipped = (part.depth - slack <= 0) | (part.depth + slack >= 1)
-        possible = inside & (part.depth + slack >= hidden[part.pixel])
-        part = replace(part, partial=part.partial | clipped).take(possible)
-        slack = slack[possible]
-        opaque = (modes[part.draw] == "opaque") & ~part.partial
-        np.maximum.at(hidden, part.pixel[opaque], (part.depth - slack)[opaque])
-        blended = modes[part.draw] == "blend"
-        for kind in (False, True):
-            which = np.flatnonzero(blended == kind)
-            if len(which):
-                parts[kind].append((part.take(which), slack[which]))
-    pieces = []
-    for kind in (False, True):
-        fragments = Fragments.joined(part for part, _ in parts[kind])
-        slack = np.concatenate([slack for _, slack in parts[kind]]) if parts[kind] else np.empty(0)
-        near = fragments.depth + slack >= hidden[fragments.pixel]
-        pieces.append(_settled(inputs, fragments.take(near), slack[near], driver))
-    return pieces[0], pieces[1]
-
-
-def _settled(inputs: Inputs, fragments: Fragments, slack: Array, driver: Freedom) -> _Pieces:
-    """Returns the fragments (N,) as pieces.
-
-    Fragments that the alpha test certainly discards are dropped. Fragments that it may discard become partial. Some triangles
-    are so thin that a driver may see either side: their fragments are listed twice, once for each side.
-    slack: (N,), as in _Pieces.
-    """
-    cutoff = np.array([draw.alpha_cutoff if draw.alpha_mode == "mask" else -np.inf for draw in inputs.draws])
-    masked = np.flatnonzero(cutoff[fragments.draw] > -np.inf)
-    uncertain = np.zeros(len(fragments), dtype=np.bool_)
-    if len(masked):
-        _, low, high = alphas(inputs, fragments.take(masked), driver)
-        limit = cutoff[fragments.draw[masked]]
-        uncertain[masked] = low < limit
-        kept = np.ones(len(fragments), dtype=np.bool_)
-        kept[masked] = high >= limit
-        fragments, slack, uncertain = fragments.take(kept), slack[kept], uncertain[kept]
-    partial = fragments.partial | uncertain
-    sealed = np.zeros(len(fragments), dtype=np.bool_)
-    which = np.flatnonzero(fragments.partial & ~uncertain)
-    if not len(which):
-        return _Pieces(fragments, slack, partial, sealed)
-    sealed[which] = is_sealed(inputs, fragments.take(which), driver)
-    pieces = _Pieces(fragments, slack, partial, sealed)
-    turned = which[may_turn(inputs, fragments.take(which), driver)]
-    if not len(turned):
-        return pieces
-    other = replace(fragments.take(turned), front=~fragments.front[turned])
-    return _Pieces(
-        Fragments.joined([fragments, other]),
-        np.concatenate([slack, slack[turned]]),
-        np.concatenate([partial, partial[turned]]),
-        np.concatenate([sealed, sealed[turned]]),
-    )
 
 
 def _compose(

@@ -29,6 +29,7 @@ class PixelClass(IntEnum):
     TIE: several surfaces are at depths that a driver may be unable to tell apart.
     MASKED: the caller excluded the pixel by a mask.
     WIDE: float32 does not determine the pixel's value. A candidate's interval is so wide that it would explain a wrong value.
+    EDGE: the pixel's samples may show several surfaces. Its value is a mixture, and lies in the hull of their values.
     """
 
     BACKGROUND = 0
@@ -38,11 +39,12 @@ class PixelClass(IntEnum):
     TIE = 4
     MASKED = 5
     WIDE = 6
+    EDGE = 7
 
     @property
     def ambiguous(self) -> bool:
         """Whether pixels of this class are ambiguous. A picture with too many ambiguous pixels cannot be verified."""
-        return self >= PixelClass.SILHOUETTE
+        return self in (PixelClass.SILHOUETTE, PixelClass.TIE, PixelClass.MASKED, PixelClass.WIDE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +58,8 @@ class Expected:
     pixel: (N,), ascending, the pixel of each candidate.
     low, high: (N, 4), the interval of each candidate.
     centre: (N, 4), the reference's own value of each candidate, inside the interval.
+    room: the distance from the background's value that still counts as the background.
+    mixed: True if pixels have several samples, so that the interval of a seam or an edge is the hull of several values.
     """
 
     size: tuple[int, int]
@@ -66,6 +70,8 @@ class Expected:
     low: Array
     high: Array
     centre: Array
+    room: float = 0.0
+    mixed: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,8 +79,8 @@ class Comparison:
     """The result of comparing a picture with its candidates.
 
     A candidate explains a pixel if the pixel's value lies within the candidate's interval. The pixel's tolerance is the
-    distance from the centre of the nearest candidate to the end of its interval. Only interior pixels and seams count in worst,
-    rmse, p999 and tolerance.
+    distance from the centre of the nearest candidate to the end of its interval. Only interior pixels count in worst, rmse,
+    p999 and tolerance, and seams if each pixel has one sample.
 
     counts: the number of pixels of each class.
     non_finite: the number of channel values that are infinite or NaN.
@@ -112,8 +118,9 @@ class Comparison:
 
     @property
     def doubtful(self) -> float:
-        """The share of silhouettes, ties, masked and wide pixels among the pixels that are not background."""
-        return self._ambiguous / max(sum(self.counts.values()) - self.counts[PixelClass.BACKGROUND], 1)
+        """The share of silhouettes, ties, masked and wide pixels and edges among the pixels that are not background."""
+        doubtful = self._ambiguous + self.counts[PixelClass.EDGE]
+        return doubtful / max(sum(self.counts.values()) - self.counts[PixelClass.BACKGROUND], 1)
 
     @property
     def _ambiguous(self) -> int:
@@ -121,7 +128,7 @@ class Comparison:
 
 
 def classify(
-    size: int, pixel: Indices, depth: Array, slack: Array, partial: Flags, sealed: Flags
+    size: int, pixel: Indices, front: Array, back: Array, partial: Flags, sheet: Indices
 ) -> tuple[Flags, NDArray[np.uint8], Flags, Array]:
     """Returns (kept (N,), classes (size,), open (size,), hidden (size,)) for N opaque candidates.
 
@@ -132,19 +139,22 @@ def classify(
 
     size: the number of pixels in the picture.
     pixel: (N,), the pixel of each candidate.
-    depth: (N,), from 1 at the near plane to 0 at the far plane.
-    slack: (N,), the largest difference between the driver's depth and `depth`.
+    front: (N,), the largest depth that a driver may find, from 1 at the near plane to 0 at the far plane.
+    back: (N,), the smallest depth that a driver may find.
     partial: (N,), True for a candidate that a driver may leave out.
-    sealed: (N,), True for a partial candidate if it and others together certainly cover the pixel.
+    sheet: (N,), the number of the sheet that a partial candidate belongs to; -1 if it belongs to none. The candidates of a
+        sheet certainly cover their pixel together.
     """
     nearest = np.full(size, -np.inf)
     certain = ~partial
-    np.maximum.at(nearest, pixel[certain], (depth - slack)[certain])
-    together = np.full(size, np.inf)
-    np.minimum.at(together, pixel[sealed], (depth - slack)[sealed])
-    together[np.isinf(together)] = -np.inf
-    hidden = np.maximum(nearest, together)
-    kept = depth + slack >= hidden[pixel]
+    np.maximum.at(nearest, pixel[certain], back[certain])
+    sealed = sheet >= 0
+    _, first, number = np.unique(sheet[sealed], return_index=True, return_inverse=True)
+    together = np.full(len(first), np.inf)
+    np.minimum.at(together, number.reshape(-1), back[sealed])
+    hidden = nearest
+    np.maximum.at(hidden, pixel[sealed][first], together)
+    kept = front >= hidden[pixel]
     count = np.bincount(pixel[kept], minlength=size)
     full = np.zeros(size, dtype=np.bool_)
     full[pixel[kept & (certain | sealed)]] = True
@@ -180,6 +190,7 @@ def judge(picture: Array, expected: Expected, mask: Flags | None = None) -> Comp
         classes[np.asarray(mask, dtype=np.bool_).reshape(-1)] = PixelClass.MASKED
     background = np.asarray(expected.background, dtype=np.float32).astype(np.float64)[:channels]
     from_background = np.abs(value - background).max(axis=1)
+    from_background[from_background <= expected.room] = 0.0
 
     actual = value[expected.pixel]
     low, high, centre = (part[:, :channels] for part in (expected.low, expected.high, expected.centre))
@@ -211,7 +222,7 @@ def judge(picture: Array, expected: Expected, mask: Flags | None = None) -> Comp
     allowed[place] = room[chosen].max(axis=1)
     excess[broken] = errors[broken] = np.inf
     excess[classes == PixelClass.MASKED] = 0.0
-    counted = ((classes == PixelClass.INTERIOR) | (classes == PixelClass.SEAM)) & ~broken
+    counted = ((classes == PixelClass.INTERIOR) | ((classes == PixelClass.SEAM) & (not expected.mixed))) & ~broken
     interior = errors[counted]
     number = np.bincount(classes, minlength=len(PixelClass))
     return Comparison(

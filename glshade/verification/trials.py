@@ -14,7 +14,7 @@ from glshade.gl.renderer import Renderer
 from glshade.glsl.source import Rewrite
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
-from glshade.verification.candidates import Candidates, find_candidates, single_sample
+from glshade.verification.candidates import Candidates, find_candidates, one_sample
 from glshade.verification.mutations import MUTATIONS, Mutation
 from glshade.verification.verdict import Verdict, verdict_of
 
@@ -57,15 +57,16 @@ def try_mutations(
     shading: Rate | None = None,
     expected: Candidates | None = None,
 ) -> list[Trial]:
-    """Draws the scene with one mutation at a time and has the verifier judge each picture.
+    """Draws the scene with one mutation at a time and one sample a pixel, and has the verifier judge each picture.
 
+    With several samples, small faults may hide in the hulls of a dense mesh, whose every pixel has edges.
     names: the mutations to try; the default is all.
     renderer: draws the pictures. Its `rewrite` is None afterwards.
     shading: the rate for the whole scene; the default is each object's own.
-    expected: the scene's candidates, if they are known already.
+    expected: the candidates of the scene with one sample a pixel, if they are known already.
     Errors: those of `Renderer.render`.
     """
-    scene = single_sample(scene)
+    scene = one_sample(scene)
     expected = expected or find_candidates(scene, shading=shading, driver=measure_freedom(renderer.context))
 
     def draw(rewrite: Rewrite | None) -> Array:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.image.srgb import linear_to_srgb
+from glshade.image.image import Image
+from glshade.image.srgb import linear_to_srgb, srgb_to_linear
 from glshade.reference.bounds import fragment_bounds
-from glshade.reference.raster import MARGIN, Fragments, rasterise
+from glshade.reference.raster import Fragments, rasterise
 from glshade.verification.candidates import Candidates
+from glshade.verification.codes import LARGEST, carried
 from glshade.verification.judgement import Comparison, PixelClass, judge
 
 Array = NDArray[Any]
@@ -24,8 +26,8 @@ Origin = Literal["coverage", "depth", "shading", "encode", "not finite", "-"]
 
 # The default largest share of ambiguous pixels (silhouettes, ties, masked and wide pixels) in a picture that can be verified.
 MAX_AMBIGUOUS = 0.03
-# The largest share of ambiguous pixels among the pixels that are not background. Without this limit, a tiny object on a large
-# background could be verified although all its pixels are ambiguous.
+# The largest share of ambiguous pixels and edges among the pixels that are not background. Without this limit, a tiny object on
+# a large background could be verified although all its pixels are ambiguous.
 MAX_DOUBTFUL = 0.5
 # The number of pixels in the table of the worst ones.
 WORST = 12
@@ -35,13 +37,15 @@ WORST = 12
 class Pixel:
     """One row of the table of the worst pixels. C is the number of the picture's channels.
 
+    Values are in linear light. In an 8-bit picture they are codes divided by 255, with straight alpha.
+
     x, y: the pixel, counted from the top left.
     object: the name of the object that the nearest candidate belongs to, or "background".
     triangle: the candidate's triangle in that object; -1 for the background.
     kind: the name of the PixelClass in lower case.
-    value: (C,), the picture's value [linear].
-    low, high: (C,) each, the interval of the nearest candidate [linear].
-    error: the distance from the centre of the nearest candidate, in the channel where it is largest [linear].
+    value: (C,), the picture's value.
+    low, high: (C,) each, the interval of the nearest candidate.
+    error: the distance from the centre of the nearest candidate, in the channel where it is largest.
     used: the ratio of the error to the pixel's tolerance.
     origin: the stage of the pipeline at which an unexplained value seems to arise.
     """
@@ -67,11 +71,12 @@ class Verdict:
     reasons: the reasons why the picture is not verified, one sentence for each.
     comparison: the comparison with the reference, pixel by pixel.
     worst_pixels: the worst pixels, the worst one first.
-    picture, reference: (H, W, 3 or 4) float32 [linear, premultiplied].
+    picture, reference: (H, W, 3 or 4), float32 [linear, premultiplied], or the uint8 codes of an 8-bit picture.
     classes: (H, W), the PixelClass of each pixel.
     driver: the names of the OpenGL renderer and version that drew the picture.
     seconds: name of a step -> the time that it took [s].
     left_out: the settings of the scene that were not judged, each as "name = value"; the picture was drawn without them.
+    encoding: the encoding of an 8-bit picture, "srgb" or "linear"; empty for a linear float picture.
     """
 
     verdict: Literal["verified", "failed", "inconclusive"]
@@ -84,6 +89,7 @@ class Verdict:
     driver: str
     seconds: dict[str, float]
     left_out: tuple[str, ...] = ()
+    encoding: str = ""
 
     @property
     def unexplained(self) -> int:
@@ -162,10 +168,8 @@ class Verdict:
             ]
             for p in self.worst_pixels
         ]
-        return write(
-            folder,
-            Report(title, self.verdict, self.reasons, self.picture, self.reference, c, self.classes, facts, heads, rows),
-        )
+        picture, reference = (Image(p, self.encoding or "linear").linear().pixels for p in (self.picture, self.reference))
+        return write(folder, Report(title, self.verdict, self.reasons, picture, reference, c, self.classes, facts, heads, rows))
 
     def as_dict(self) -> dict[str, Any]:
         """Returns the verdict in a form that JSON can hold, without the pictures."""
@@ -198,18 +202,21 @@ def verdict_of(
     made_by: str = "",
     *,
     explain: bool = True,
+    max_doubtful: float = MAX_DOUBTFUL,
 ) -> Verdict:
     """Returns the verdict on a picture.
 
-    picture: (H, W, 3 or 4) [linear, premultiplied].
+    picture: (H, W, 3 or 4) [linear, premultiplied], or uint8 codes with straight alpha if the candidates are encoded.
     expected: the values that its pixels may have.
     mask: optional (H, W); True for pixels that are not judged and count as ambiguous.
     max_ambiguous: the largest share of ambiguous pixels in a picture that can be verified.
     made_by: the names of the OpenGL renderer and version that drew the picture.
     explain: True to list the worst pixels, which takes time.
+    max_doubtful: the largest share of ambiguous pixels and edges among the pixels that are not background.
     Errors: GlshadeError where the picture has another size than the reference's.
     """
-    comparison = judge(picture, expected.expected, mask)
+    values = picture / LARGEST if expected.encoding else picture
+    comparison = judge(values, expected.expected, mask)
     reasons = []
     if comparison.non_finite:
         reasons.append(f"{comparison.non_finite} value{'s are' if comparison.non_finite > 1 else ' is'} not finite")
@@ -222,20 +229,23 @@ def verdict_of(
     if not reasons and comparison.ambiguous > max_ambiguous:
         verdict = "inconclusive"
         reasons.append(f"{comparison.ambiguous:.2%} of the picture is ambiguous, more than {max_ambiguous:.2%}")
-    elif not reasons and comparison.doubtful > MAX_DOUBTFUL:
+    elif not reasons and comparison.doubtful > max_doubtful:
         verdict = "inconclusive"
-        reasons.append(f"{comparison.doubtful:.0%} of all but the background is ambiguous, more than {MAX_DOUBTFUL:.0%}")
+        reasons.append(
+            f"{comparison.doubtful:.0%} of all but the background is ambiguous or an edge, more than {max_doubtful:.0%}"
+        )
     channels = picture.shape[2]
     return Verdict(
         verdict,
         tuple(reasons),
         comparison,
-        tuple(_worst(picture, expected, comparison)) if explain else (),
+        tuple(_worst(values, expected, comparison)) if explain else (),
         picture,
-        expected.picture[..., :channels].astype(np.float32),
+        expected.picture[..., :channels].astype(np.uint8 if expected.encoding else np.float32),
         np.where(mask, PixelClass.MASKED, _map(expected)) if mask is not None else _map(expected),
         made_by or "picture given",
         {},
+        encoding=expected.encoding,
     )
 
 
@@ -260,11 +270,7 @@ def _worst(picture: Array, expected: Candidates, comparison: Comparison) -> list
     result = []
     for index in chosen:
         nearest = int(comparison.candidate[index])
-        base = int(expected.base[nearest]) if nearest >= 0 else -1
-        owner, triangle = "background", -1
-        if base >= 0:
-            draw = expected.inputs.draws[int(expected.fragments.draw[base])]
-            owner, triangle = draw.instance.name, int(expected.fragments.triangle[base])
+        owner, triangle = expected.owner(nearest)
         value = picture.reshape(-1, channels)[index]
         low, high = (
             (part[nearest, :channels] if nearest >= 0 else expected.expected.background[:channels])
@@ -291,7 +297,7 @@ def _worst(picture: Array, expected: Candidates, comparison: Comparison) -> list
 def _origin(value: Array, expected: Candidates, nearest: int, hidden: tuple[Array, Array] | None) -> Origin:
     """Guesses the stage of the pipeline at which an unexplained value arises.
 
-    value: (C,), the picture's value [linear].
+    value: (C,), the picture's value.
     nearest: the index of the nearest candidate; -1 is the background.
     hidden: optional (low, high), (K, 4) each, the intervals of all K fragments of the pixel, hidden ones included.
     """
@@ -299,18 +305,20 @@ def _origin(value: Array, expected: Candidates, nearest: int, hidden: tuple[Arra
         return "not finite"
     channels = len(value)
     background = expected.expected.background[:channels]
-    if nearest < 0 or np.abs(value - background).max() <= 1e-6 * max(1.0, np.abs(background).max()):
+    near = max(expected.expected.room, 1e-6 * max(1.0, np.abs(background).max()))
+    if nearest < 0 or np.abs(value - background).max() <= near:
         # Either a surface is drawn where only the background can be, or a surface is missing.
         return "coverage"
     if hidden is not None:
         low, high = (end[:, :channels] for end in hidden)
         if ((value >= low) & (value <= high)).all(axis=1).any():
             return "depth"
-    # A value counts as encoded if its distance from the encoded centre is at most the width of the interval plus one step
-    # between 8-bit codes.
+    # A value counts as wrongly encoded if its distance from the centre, encoded once more or once less, is at most the width of
+    # the interval plus one step between 8-bit codes.
     centre = expected.expected.centre[nearest, :3]
-    room = (expected.expected.high - expected.expected.low)[nearest, :3].max() + 1 / 255
-    return "encode" if np.abs(value[:3] - linear_to_srgb(centre)).max() <= room else "shading"
+    room = (expected.expected.high - expected.expected.low)[nearest, :3].max() + 1 / LARGEST
+    others = [linear_to_srgb(centre), *([srgb_to_linear(np.clip(centre, 0, 1))] if expected.encoding else [])]
+    return "encode" if any(np.abs(value[:3] - other).max() <= room for other in others) else "shading"
 
 
 def _hidden(expected: Candidates, pixels: list[int]) -> dict[int, tuple[Array, Array]]:
@@ -319,10 +327,19 @@ def _hidden(expected: Candidates, pixels: list[int]) -> dict[int, tuple[Array, A
         return {}
     inputs = expected.inputs
     numbers = inputs.wanted.reshape(-1)[pixels]
-    parts = (part.take(np.isin(part.pixel, numbers)) for part in rasterise(inputs, MARGIN))
+    # Only the box round these pixels is drawn.
+    rows, columns = np.divmod(numbers, inputs.size[0])
+    left, top = int(columns.min()), int(rows.min())
+    box = replace(inputs, window=(left, top, int(columns.max()) - left + 1, int(rows.max()) - top + 1))
+    parts = (part.take(np.isin(part.pixel, numbers)) for part in rasterise(box, expected.driver.margin))
     fragments = Fragments.joined(parts)
-    bounds = fragment_bounds(inputs, fragments)
+    bounds = fragment_bounds(inputs, fragments, expected.driver, fragments.partial)
     low, high = bounds.interval(min(1.0, float(np.abs(bounds.value).max(initial=0.0))))
+    if expected.encoding:
+        low, high = (
+            end + side * expected.expected.room
+            for end, side in zip(carried(low, high, None, expected.encoding), (-1, 1), strict=True)
+        )
     return {
         pixel: (low[fragments.pixel == number], high[fragments.pixel == number])
         for pixel, number in zip(pixels, numbers, strict=True)

@@ -14,7 +14,7 @@ from glshade.reference.freedom import UNMEASURED, Freedom
 from glshade.scene.models import Folders, use_models
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
-from glshade.verification.candidates import find_candidates, left_out, single_sample
+from glshade.verification.candidates import find_candidates, judgeable, left_out
 from glshade.verification.verdict import MAX_AMBIGUOUS, Verdict, verdict_of
 
 Array = NDArray[Any]
@@ -35,7 +35,7 @@ def verify(
     shaders: Folders | None = None,
     models: Folders | None = None,
 ) -> Verdict:
-    """Draws a scene with one sample a pixel, compares the linear picture with the float64 reference, and returns the verdict.
+    """Draws a scene, compares the linear picture with the float64 reference, and returns the verdict.
 
     backend, device: the OpenGL context to draw with, as for Renderer.
     shading: the shading rate for the whole scene; by default, each object has its own.
@@ -53,7 +53,7 @@ def verify(
 
     use_models(models)
     not_judged = left_out(scene)
-    scene = single_sample(scene)
+    scene = judgeable(scene)
     start = perf_counter()
     made_by = ""
     with ExitStack() as opened:

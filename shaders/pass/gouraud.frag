@@ -7,5 +7,5 @@ centroid in vec3 v_radiance;
 out vec4 o_colour;
 
 void main() {
-    o_colour = encode(v_radiance, alpha());
+    o_colour = encode(v_radiance / centroid_scale(), alpha());
 }

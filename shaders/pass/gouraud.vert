@@ -7,6 +7,6 @@ centroid out vec3 v_radiance;
 
 void main() {
     interpolate();
-    v_radiance = radiance(1.0);
+    v_radiance = radiance(1.0) * vertex_scale();
     gl_Position = clip_position();
 }

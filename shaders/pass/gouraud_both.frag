@@ -8,5 +8,5 @@ centroid in vec3 v_back;
 out vec4 o_colour;
 
 void main() {
-    o_colour = encode(gl_FrontFacing ? v_front : v_back, alpha());
+    o_colour = encode((gl_FrontFacing ? v_front : v_back) / centroid_scale(), alpha());
 }

@@ -9,7 +9,7 @@ centroid out vec3 v_back;
 
 void main() {
     interpolate();
-    v_front = radiance(1.0);
-    v_back = radiance(-1.0);
+    v_front = radiance(1.0) * vertex_scale();
+    v_back = radiance(-1.0) * vertex_scale();
     gl_Position = clip_position();
 }

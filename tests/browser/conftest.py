@@ -1,4 +1,4 @@
-"""Fixtures of the tests that look at the page of `glshade dev` in Debian's Chromium."""
+"""Fixtures of the tests that look at pages in Debian's Chromium."""
 
 from __future__ import annotations
 
@@ -33,17 +33,22 @@ def browser() -> Iterator[Any]:
 
 @pytest.fixture
 def open_page(browser: Any) -> Iterator[Open]:
-    """`open_page(address, width=1440, **context)` opens a page. At the end of the test, its console must hold no errors."""
+    """`open_page(address, width=1440, **context)` opens a page. At the end of the test, its console must hold no errors.
+
+    ready: a selector of what the page holds as soon as it has started; by default a still picture of `glshade dev`.
+    """
     contexts: list[Any] = []
     errors: list[str] = []
 
-    def open_page(address: str, width: int = 1440, height: int = 900, **context: Any) -> Any:
+    def open_page(
+        address: str, width: int = 1440, height: int = 900, ready: str = "canvas[data-still=true]", **context: Any
+    ) -> Any:
         contexts.append(browser.new_context(viewport={"width": width, "height": height}, **context))
         page = contexts[-1].new_page()
         page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
         page.on("pageerror", lambda error: errors.append(str(error)))
         page.goto(address)
-        page.wait_for_selector("canvas[data-still=true]")
+        page.wait_for_selector(ready)
         return page
 
     yield open_page

@@ -27,10 +27,11 @@ FEW = ("detail", "falloff", "perspective-viewer")
 
 
 def sized(path: Path, width: int) -> glshade.Scene:
-    """Returns the scene of a file with a picture of another width [pixels] and the same aspect ratio."""
+    """Returns the scene of a file with one sample a pixel, another width [pixels] and the same aspect ratio."""
     scene = glshade.load(path)
     w, h = scene.film.size
-    return scene.model_copy(update={"film": scene.film.model_copy(update={"size": (width, round(h * width / w))})})
+    film = scene.film.model_copy(update={"size": (width, round(h * width / w)), "samples": 1})
+    return scene.model_copy(update={"film": film})
 
 
 def shown(path: Path, width: int, renderer: Renderer) -> set[str]:

@@ -12,6 +12,7 @@ from support import strategies
 
 import glshade
 from glshade.scene.object import Rate
+from glshade.verification.judgement import PixelClass
 
 ROOT = Path(__file__).resolve().parents[2]
 SCENES = sorted((ROOT / "scenes").glob("*.toml"))
@@ -21,9 +22,15 @@ MESHES = sorted(path for path in FOLDER.glob("*") if path.suffix in {".obj", ".g
 WIDTH = 192
 
 
-def sized(scene: glshade.Scene, width: int) -> glshade.Scene:
+# The scenes whose own samples are judged in the ordinary suite. The slow test takes the others, too.
+SMOOTH = ("gallery", "half-angle-grazing", "sharp-edges")
+
+
+def sized(scene: glshade.Scene, width: int, **film: Any) -> glshade.Scene:
+    """Returns the scene with a picture of another width [pixels] and the same aspect ratio, and other keys of its film."""
     w, h = scene.film.size
-    return scene.model_copy(update={"film": scene.film.model_copy(update={"size": (width, max(1, round(h * width / w)))})})
+    size = (width, max(1, round(h * width / w)))
+    return scene.model_copy(update={"film": scene.film.model_copy(update={"size": size, **film})})
 
 
 def check(scene: glshade.Scene, name: str, renderer: glshade.Renderer, **options: Any) -> glshade.Verdict:
@@ -37,15 +44,29 @@ def check(scene: glshade.Scene, name: str, renderer: glshade.Renderer, **options
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 def test_shipped_scene(path: Path, renderer: glshade.Renderer) -> None:
-    verdict = check(sized(glshade.load(path), WIDTH), path.stem, renderer)
+    verdict = check(sized(glshade.load(path), WIDTH, samples=1), path.stem, renderer)
     assert verdict.verdict == "verified", str(verdict)
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path if path.stem in SMOOTH else pytest.param(path, marks=pytest.mark.slow) for path in SCENES],
+    ids=lambda p: p.stem,
+)
+def test_shipped_scene_with_its_samples(path: Path, renderer: glshade.Renderer) -> None:
+    scene = sized(glshade.load(path), WIDTH)
+    verdict = check(scene, f"{path.stem} samples", renderer)
+    assert verdict.verdict == "verified", str(verdict)
+    assert verdict.comparison.counts[PixelClass.EDGE] > 0 or scene.film.pictures == 1
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("shading", ["flat", "gouraud", "phong"])
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 def test_shipped_scene_whole(path: Path, shading: Rate, renderer: glshade.Renderer) -> None:
-    verdict = check(glshade.load(path), f"{path.stem} {shading}", renderer, shading=shading)
+    scene = glshade.load(path)
+    scene = sized(scene, scene.film.size[0], samples=1)
+    verdict = check(scene, f"{path.stem} {shading}", renderer, shading=shading)
     assert verdict.verdict == "verified", str(verdict)
 
 

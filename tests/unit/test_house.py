@@ -17,8 +17,9 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PACKAGE = ROOT / "glshade"
 # A room imports from the rooms before it.
 ROOMS = (
-    *("optics", "image", "lights", "presets", "textures", "mesh", "brdfs", "scene", "assembly", "radiance", "glsl", "gl"),
-    *("reference", "driver", "verification", "catalogue", "pyrender", "tradeoff", "golden", "live", "batch", "bench", "cli"),
+    *("optics", "image", "page", "lights", "presets", "textures", "mesh", "brdfs", "scene", "assembly", "radiance"),
+    *("glsl", "gl", "reference", "driver", "verification", "catalogue", "pyrender", "tradeoff", "golden"),
+    *("live", "batch", "bench", "cli"),
 )
 # Modules of no room, which every room may import. They import no room.
 BASE = {"errors", "found", "document", "files", "limits", "arrays", "version", "lru", "problem"}
@@ -162,3 +163,13 @@ def test_a_worker_starts_without_what_only_some_pictures_need(python: Any) -> No
     rooms = {room(name) for name in found if name.startswith("glshade.")} & set(ROOMS)
     assert not rooms & {"reference", "driver", "verification", "catalogue", "pyrender", "tradeoff", "bench", "cli"}
     assert not found & {"trimesh", "rich", "scipy", "click", "dask", "distributed", "PIL"}
+
+
+def test_pytest_loads_no_more_of_the_plugin_than_it_must_know(python: Any, tmp_path: Path) -> None:
+    """A run of pytest in which no test uses the plugin pays for its options and hooks alone."""
+    (tmp_path / "test_nothing.py").write_text("def test_nothing(): pass\n", encoding="utf-8")
+    run = "import pytest; assert pytest.main(['-q', '-p', 'no:cacheprovider', 'test_nothing.py']) == 0; print()"
+    found = set(python(f"{run}; import sys; print(*sys.modules)", cwd=tmp_path).split())
+    plugin = "glshade.golden.pytest_plugin"
+    assert {name for name in found if name.startswith("glshade")} == {"glshade", "glshade.version", "glshade.golden", plugin}
+    assert not found & HEAVY

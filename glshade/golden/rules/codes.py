@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from glshade.golden.pair import Pair, encoded, merged
 from glshade.golden.result import Finding, Outcome
 from glshade.golden.rules import Rule
+from glshade.golden.rules.exact import Exact
 
 Array = NDArray[Any]
 
@@ -22,10 +23,12 @@ class Codes(Rule):
     """8-bit codes may differ by 1; floats are encoded first, and above 1 they may differ by 1/255 of the value.
 
     A pixel may differ by more where each picture holds, in the 3x3 pixels around it, the value that the other picture has at
-    the pixel. At most the larger of 4 pixels and 0.05 % of all pixels may do so.
+    the pixel. At most the larger of 4 pixels and 0.05 % of all pixels may do so. A layer of ids must be equal.
     """
 
     def judge(self, pair: Pair) -> Finding:
+        if pair.holds_ids:
+            return _judge_ids(pair)
         reference, test = pair.changed_values
         far = ~close(reference, test, pair.channels)
         count = int(np.count_nonzero(far))
@@ -45,6 +48,12 @@ class Codes(Rule):
             f"{np.count_nonzero(alien)} of the pixels that differ by more than 1 code have a value that no neighbour has in "
             f"the other picture; the first is x = {x}, y = {y}",
         )
+
+
+def _judge_ids(pair: Pair) -> Finding:
+    """Returns the judgement of two layers of ids. Two ids that differ could become the same 8-bit code."""
+    finding = Exact().judge(pair)
+    return Finding(finding.outcome, f"{finding.reason}; these are ids, which must be equal") if pair.count else finding
 
 
 def close(a: Array, b: Array, channels: tuple[str, ...]) -> NDArray[np.bool_]:

@@ -15,7 +15,7 @@ from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.picture import radiance
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
-from glshade.verification.candidates import find_candidates, single_sample
+from glshade.verification.candidates import find_candidates, one_sample
 from glshade.verification.judgement import Expected, PixelClass, judge
 from glshade.verification.laws._law import Draw, Law, NotApplicableError
 from glshade.verification.laws._scenes import with_quality
@@ -91,7 +91,7 @@ def _tried(scene: Scene) -> Scene:
     `quality.refine` cuts the triangles whose interpolated light has an error above a threshold. A rounding error could move a
     triangle over this threshold, so that no law would hold.
     """
-    scene = with_quality(single_sample(scene), refine=None)
+    scene = with_quality(one_sample(scene), refine=None)
     return scene.model_copy(update={"film": scene.film.model_copy(update={"crop": None})})
 
 

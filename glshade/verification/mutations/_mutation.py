@@ -22,12 +22,14 @@ class Mutation:
     description: the fault in one line.
     edits: pairs of a regular expression and its replacement. They are applied to the text of every stage of every program.
     picture: a function that takes the pixels of a correct picture (H, W, 3 or 4) and returns faulty ones of the same shape.
+    causes: the kinds of causes, one of which `glshade compare` names for the fault; empty where none is expected.
     """
 
     name: str
     description: str
     edits: tuple[tuple[str, str], ...] = ()
     picture: Callable[[Array], Array] | None = None
+    causes: tuple[str, ...] = ()
 
     def rewrite(self, source: Source) -> Source:
         """Returns the source with the edits applied. It is unchanged if no pattern matches."""

@@ -8,4 +8,5 @@ MUTATION = Mutation(
     name="all-nan",
     description="every value is NaN",
     picture=lambda pixels: np.full_like(pixels, np.nan),
+    causes=("not finite",),
 )

@@ -8,4 +8,5 @@ MUTATION = Mutation(
     name="black",
     description="every value is 0",
     picture=np.zeros_like,
+    causes=("empty",),
 )

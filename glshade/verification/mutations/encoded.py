@@ -9,4 +9,5 @@ MUTATION = Mutation(
     name="encoded",
     description="the picture is sRGB-encoded although it should be linear",
     picture=lambda pixels: np.concatenate([linear_to_srgb(pixels[..., :3]), pixels[..., 3:]], axis=2),
+    causes=("encode",),
 )

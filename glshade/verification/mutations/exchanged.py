@@ -6,4 +6,5 @@ MUTATION = Mutation(
     name="exchanged",
     description="l and v are exchanged",
     edits=((r"brdf_cos\(m, f, l, v\)", r"brdf_cos(m, f, v, l)"),),
+    causes=("directions",),
 )

@@ -6,4 +6,5 @@ MUTATION = Mutation(
     name="exponent-1-percent",
     description="every exponent is 1 % too large",
     edits=((r"m\.(exponent|pu) = ([^;]+);", r"m.\1 = 1.01 * (\2);"),),
+    causes=("parameter",),
 )

@@ -6,4 +6,5 @@ MUTATION = Mutation(
     name="exponent-squared",
     description="every exponent is squared",
     edits=((r"m\.(exponent|pu) = ([^;]+);", r"m.\1 = (\2) * (\2);"),),
+    causes=("parameter", "lobe"),
 )

@@ -9,4 +9,5 @@ MUTATION = Mutation(
         (r"1\.0 / max\(dot\(to_light, to_light\), r_min \* r_min\)", r"1.0 / max(length(to_light), sqrt(r_min * r_min))"),
         (r"1\.0 / max\(length\(to_light\), r_min\)", r"1.0 / max(dot(to_light, to_light), r_min * r_min)"),
     ),
+    causes=("falloff",),
 )

@@ -6,4 +6,5 @@ MUTATION = Mutation(
     name="light-1-percent",
     description="every light with a direction is 1 % too strong",
     edits=((r"= illuminate\(light, p, l\);", r"= 1.01 * illuminate(light, p, l);"),),
+    causes=("light", "exposure"),
 )

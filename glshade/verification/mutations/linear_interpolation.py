@@ -6,4 +6,5 @@ MUTATION = Mutation(
     name="linear-interpolation",
     description="attributes are interpolated linearly in the picture, without perspective correction",
     edits=((r"\bcentroid (in|out) ", r"noperspective centroid \1 "),),
+    causes=("interpolation",),
 )

@@ -6,4 +6,5 @@ MUTATION = Mutation(
     name="mirrored",
     description="tangent frames have the opposite handedness",
     edits=((r"cross\(n, t\) \* tangent\.w", r"cross(n, t) * -tangent.w"),),
+    causes=("tangents",),
 )

@@ -8,4 +8,5 @@ MUTATION = Mutation(
     name="normal-0.1-degree",
     description="every normal is turned by 0.1 degree",
     edits=((r"Frame f = frame\(side\);", f"Frame f = frame(side); f.n = {_TURNED};"),),
+    causes=("normals",),
 )

@@ -12,4 +12,9 @@ def _with_nan(pixels: Array) -> Array:
     return result
 
 
-MUTATION = Mutation(name="one-nan", description="one value is NaN", picture=_with_nan)
+MUTATION = Mutation(
+    name="one-nan",
+    description="one value is NaN",
+    picture=_with_nan,
+    causes=("not finite",),
+)

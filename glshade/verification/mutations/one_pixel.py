@@ -13,4 +13,10 @@ def _with_bright_pixel(pixels: Array) -> Array:
     return result
 
 
-MUTATION = Mutation(name="one-pixel", description="one pixel is twice as bright", picture=_with_bright_pixel)
+MUTATION = Mutation(
+    name="one-pixel",
+    description="one pixel is twice as bright",
+    picture=_with_bright_pixel,
+    # Nearly any fault would explain one pixel, so none is named.
+    causes=("unknown",),
+)

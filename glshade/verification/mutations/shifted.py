@@ -8,4 +8,5 @@ MUTATION = Mutation(
     name="shifted",
     description="the picture is moved right by one pixel",
     picture=lambda pixels: np.roll(pixels, 1, axis=1),
+    causes=("shift",),
 )

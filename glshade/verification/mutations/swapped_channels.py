@@ -8,4 +8,5 @@ MUTATION = Mutation(
     name="swapped-channels",
     description="red and blue are exchanged",
     picture=lambda pixels: np.concatenate([pixels[..., 2::-1], pixels[..., 3:]], axis=2),
+    causes=("exchange",),
 )

@@ -8,4 +8,5 @@ MUTATION = Mutation(
     edits=(
         (r"return Frame\(side \* n, t, cross\(n, t\) \* tangent\.w\);", r"return Frame(side * n, cross(n, t) * tangent.w, t);"),
     ),
+    causes=("tangents",),
 )

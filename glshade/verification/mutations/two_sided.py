@@ -6,4 +6,5 @@ MUTATION = Mutation(
     name="two-sided",
     description="n.l loses its sign",
     edits=((r"float NoL = dot\(f\.n, l\);", r"float NoL = abs(dot(f.n, l));"),),
+    causes=("two-sided",),
 )

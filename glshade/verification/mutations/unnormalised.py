@@ -9,4 +9,5 @@ MUTATION = Mutation(
         (r"return Frame\(side \* unit\(", r"return Frame(side * ("),
         (r"vec3 n = unit\(normal\);", r"vec3 n = normal;"),
     ),
+    causes=("normals",),
 )

@@ -6,4 +6,5 @@ MUTATION = Mutation(
     name="upside-down",
     description="the picture's rows run from bottom to top",
     picture=lambda pixels: pixels[::-1].copy(),
+    causes=("flip",),
 )

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,7 @@ import numpy as np
 import pytest
 from support.command import run_command
 
+import glshade
 from glshade.image import file as picture_file
 from glshade.image.contents import PictureContents
 
@@ -59,8 +62,8 @@ def test_rules(run: Any) -> None:
     assert run("ref.png", "near.png", "--rule", "exact").code == 2
     assert run("ref.png", "near.png", "--rule", "codes").code == 0
     assert run("ref.png", "near.png", "--rule", "idiff").code == 2
-    assert run("ref.png", "near.png", "--fail", "0.01").code == 1
-    assert run("ref.png", "near.png", "--fail", "0.01", "--warn", "0.01").code == 0
+    assert run("ref.png", "near.png", "--fail", "0.01").code == 0
+    assert run("ref.png", "near.png", "--failpercent", "100").code == 1
     assert (
         run("ref.png", "far.png", "--fail", "0.01", "--failpercent", "2.5", "--warn", "0.01", "--warnpercent", "2.4").code == 1
     )
@@ -92,10 +95,94 @@ def test_wrong_usage_is_64(arguments: tuple[str, ...], run: Any) -> None:
     assert "Error: " in result.err
 
 
+@pytest.mark.parametrize("option", ["--diff", "--junit"])
+@pytest.mark.parametrize("path", ["ref.png", "far.png", "./a/../far.png", "link.png", "hard.png"])
+def test_no_output_replaces_a_compared_picture(option: str, path: str, run: Any) -> None:
+    Path("a").mkdir()
+    Path("link.png").symlink_to("ref.png")
+    Path("hard.png").hardlink_to("ref.png")
+    before = {name: Path(name).read_bytes() for name in ("ref.png", "far.png")}
+    result = run("ref.png", "far.png", option, path)
+    assert result.code == 64
+    assert f"{option} would replace " in result.err
+    assert before == {name: Path(name).read_bytes() for name in before}
+
+
+def test_no_output_becomes_a_compared_picture(run: Any) -> None:
+    write("a/x.png")
+    write("b/x.png")
+    Path("link").symlink_to("b")
+    for path in ("a/report.xml", "link/report.xml"):
+        result = run("a", "b", "--junit", path)
+        assert result.code == 64
+        assert "whose files are compared" in result.err
+    assert run("a", "b", "--junit", "ab.xml").code == 0
+
+
+def test_the_rule_of_the_sidecar_counts_unless_another_is_named(run: Any, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("base").mkdir()
+    write("out/a.png")
+    assert run("base", "out", "--rule", "exact", "--report", "results").code == 4
+    assert run_command(capsys, "approve", "results").code == 0
+    write("out/a.png", GREY + 1)
+    assert run("base", "out").out.startswith("fail   a.png: 600 of 600 pixels differ; ")
+    assert run("base", "out", "--rule", "codes").code == 0
+    sidecar = Path("base/a.png.glshade.json")
+    sidecar.write_text(sidecar.read_text(encoding="utf-8").replace('"exact"', '"exakt"'), encoding="utf-8")
+    code, out, _ = run("base", "out", "--report", "results")
+    assert code == 4
+    assert out.startswith("file   a.png: the sidecar of base/a.png cannot be used: no rule is named 'exakt'")
+
+
+def test_a_named_rule_judges_in_place_of_the_scene_of_the_sidecar(run: Any) -> None:
+    """The baseline by the reference and the picture of a driver differ by rounding alone, which its scene allows."""
+    baseline = Path(__file__).resolve().parents[2] / "baselines" / "shading-rates.png"
+    overrides = json.loads(baseline.with_name(baseline.name + ".glshade.json").read_text(encoding="utf-8"))["overrides"]
+    scene = glshade.load(baseline.parents[2] / "scenes" / "shading-rates.toml", [text.split("=", 1) for text in overrides])
+    pixels = glshade.reference.render(scene).encoded().pixels.copy()
+    pixels[10, 10:20] += 1
+    write("near.png", pixels)
+    assert run(baseline, "near.png").code == 0
+    assert run(baseline, "near.png", "--rule", "exact").code == 2
+
+
+def test_flip_is_told_and_judges_if_it_is_asked_for(run: Any) -> None:
+    assert "FLIP" not in run("ref.png", "near.png").out
+    assert run("ref.png", "near.png", "--flip") == (
+        0,
+        "same   near.png: max 0.00392, RMSE 0.00392, p99.9 0.00392, FLIP 0.0308, 1800 codes differ\n",
+        "",
+    )
+    code, out, _ = run("ref.png", "near.png", "--max-flip", "0.001", "--json")
+    assert code == 2
+    assert json.loads(out)["pairs"][0]["reason"] == "FLIP is 0.0308, and at most 0.001 is allowed"
+    assert run("ref.png", "near.png", "--max-flip", "0.04").code == 0
+    assert run("ref.png", "far.png", "--max-flip", "1").code == 2
+    assert run("ref.png", "near.png", "--max-flip", "nan").code == 64
+
+
+def test_libpng_does_not_print(tmp_path: Path) -> None:
+    """libpng prints its errors to the process's standard error, whatever the program does with them."""
+    write(str(tmp_path / "ref.png"))
+    (tmp_path / "cut.png").write_bytes((tmp_path / "ref.png").read_bytes()[:-20])
+    arguments = [sys.executable, "-m", "glshade", "compare", "ref.png", "cut.png"]
+    done = subprocess.run(arguments, cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (4, "")
+    assert done.stdout.startswith("file   cut.png: cannot be read as a picture: ")
+    assert done.stdout.count("\n") == 1
+
+
+def test_names_that_are_too_long_are_files(run: Any) -> None:
+    long = "x" * 5000 + ".png"
+    for arguments in (("ref.png", long), (long, "ref.png")):
+        code, out, err = run(*arguments)
+        assert (code, err) == (4, "")
+        assert out.endswith("File name too long\n")
+
+
 def test_an_error_outside_the_comparison_is_not_a_warning(run: Any) -> None:
     result = run("ref.png", "same.png", "--junit", "absent/report.xml")
-    assert result.code == 4
-    assert result.err.startswith("glshade: ")
+    assert (result.code, result.err) == (4, "glshade: absent/report.xml: cannot be written: No such file or directory\n")
     Path("a").mkdir()
     assert run("a", "a") == (4, "", "glshade: a and a hold no files to compare\n")
 
@@ -143,7 +230,7 @@ class TestFolders:
         Path("test/sizes/small.png").unlink()
         Path("ref/sizes/small.png").unlink()
         assert run("ref", "test").code == 2
-        assert run("ref", "test", "--fail", "0.3").code == 1
+        assert run("ref", "test", "--failpercent", "5").code == 1
         assert run("ref", "test", "--allowfailures", "15").code == 0
 
     def test_json(self, run: Any) -> None:
@@ -155,6 +242,17 @@ class TestFolders:
         (layer,) = report["pairs"][0]["layers"]
         assert layer["metrics"]["codes"] == 45
         assert layer["metrics"]["worst"] == pytest.approx(0.2)
+
+    def test_report(self, run: Any) -> None:
+        """The report has every pair, also those with a file that cannot be read, and its page obeys no name."""
+        Path("test/memory.png").symlink_to("/proc/self/mem")
+        write("ref/memory.png")
+        assert run("ref", "test", "--report", "report").code == 4
+        cases = json.loads(Path("report/results.json").read_text(encoding="utf-8"))["cases"]
+        assert sorted(case["outcome"] for case in cases) == ["fail", "fail", "file", "file", "file", "same", "sizes"]
+        page = Path("report/index.html").read_text(encoding="utf-8")
+        assert "a|&lt;b&gt;" in page
+        assert "a|<b>" not in page
 
     def test_junit(self, run: Any) -> None:
         run("ref", "test", "--junit", "report.xml")

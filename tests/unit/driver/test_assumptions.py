@@ -24,7 +24,7 @@ BROKEN: dict[str, tuple[tuple[Any, ...], Any, str]] = {
     "loops": (("loop_rounds", "fragment"), 255, "missing"),
     "float storage": (("formats", "RGBA32F", "exact"), False, "linear pictures"),
     "bytes": (("formats", "RGBA8", "lsb"), 1.0, "off by one"),
-    "grid": (("subpixel_bits", "measured"), 4, "refuses to judge"),
+    "grid": (("subpixel_bits", "measured"), 4, "more pixels ambiguous"),
     "snapping": (("interpolation_shift_in_steps",), 0.4, "1/512"),
 }
 

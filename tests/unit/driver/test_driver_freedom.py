@@ -50,6 +50,8 @@ def test_a_driver_without_errors() -> None:
 
 # A case -> a key of the measurements, its value, and the fields of Freedom that follow from it.
 CASES: dict[str, tuple[str, Any, dict[str, Any]]] = {
+    "a coarser grid": ("subpixel_bits", {"told": 4, "measured": 4}, {"subpixel_bits": 4, "snap": 0.0}),
+    "a finer grid": ("subpixel_bits", {"told": 10, "measured": 10}, {"subpixel_bits": 10}),
     "snapped corners": ("interpolation_shift_in_steps", 0.4, {"snap": 1 / SUBPIXELS}),
     "corners snapped the other way": ("interpolation_shift_in_steps", -0.4, {"snap": 1 / SUBPIXELS}),
     "clipping": ("clips_at_sides", True, {"clips": True}),
@@ -71,9 +73,14 @@ def test_an_error_that_is_measured_is_allowed(name: str) -> None:
     assert {field: getattr(measured, field) for field in fields} == fields
 
 
-def test_a_coarse_grid_cannot_be_judged() -> None:
-    with pytest.raises(ContextError, match="1/16 pixel"):
-        freedom_of("coarse", {**PERFECT, "subpixel_bits": {"told": 4, "measured": 4}})
+def test_a_grid_coarser_than_opengl_allows_cannot_be_judged() -> None:
+    with pytest.raises(ContextError, match="1/8 pixel, and OpenGL demands 1/16"):
+        freedom_of("coarse", {**PERFECT, "subpixel_bits": {"told": 3, "measured": 3}})
+
+
+def test_corners_snapped_to_a_coarse_grid_move_the_attributes_by_a_step_of_it() -> None:
+    coarse = {"subpixel_bits": {"told": 4, "measured": 4}, "interpolation_shift_in_steps": 0.4}
+    assert freedom_of("coarse", {**PERFECT, **coarse}).snap == 1 / 16
 
 
 @pytest.mark.parametrize("name", ["detail", "spatial-variation"])

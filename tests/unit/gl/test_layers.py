@@ -114,12 +114,7 @@ LOBES, APART = 2e-7, 1e-5
     ids=["as the objects say", "several samples", "supersampled, exposed, with alpha"],
 )
 def test_lobes_and_lights_add_up(renderer: g.Renderer, scene: Any, shading: Any, film: Any) -> None:
-    # In perspective, llvmpipe divides centroid-interpolated values by the w of another point. A triangle seen edge-on then gets
-    # twice its light, except in programs that pass a constant, such as an ambient light's. So multisampled films have
-    # a parallel view.
-    camera = {**CAMERA, "type": "orthographic", "height": 2.8, "fov": None} if film.get("samples") else CAMERA
-    camera = {key: value for key, value in camera.items() if value is not None}
-    made = renderer.layers(scene(**film, aovs=SUMS, camera=camera), shading=shading)
+    made = renderer.layers(scene(**film, aovs=SUMS), shading=shading)
     lobes, apart = deviations(made)
     assert lobes <= LOBES
     assert apart <= APART

@@ -39,7 +39,8 @@ def compare(reference: Path, test: Path, rule: str = "codes") -> Result:
 def test_the_same_bytes_are_the_same_without_decoding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     a, b = (written(tmp_path / name) for name in ("a.png", "b.png"))
     monkeypatch.setattr(picture_file, "read_part", None)
-    assert compare(a, b) == Result(str(b), str(b), Outcome.SAME)
+    result = compare(a, b)
+    assert (result.name, result.outcome, result.reason, result.layers) == (str(b), Outcome.SAME, "", ())
 
 
 def test_the_same_pixels_in_other_bytes_are_the_same(tmp_path: Path) -> None:
@@ -154,8 +155,19 @@ def bad_files(folder: Path) -> dict[str, str]:
     assert wide.write(str(folder / "wide.png"), "uint16")
     image = pytest.importorskip("PIL.Image", reason="Pillow writes the CMYK picture")
     image.new("CMYK", (4, 4)).save(folder / "cmyk.jpg")
+    spec = oiio.ImageSpec(4, 4, 2, "float")
+    spec.channelformats, spec.channelnames = ("float", "uint"), ("Y", "object_id")
+    output = oiio.ImageOutput.create(str(folder / "ids.exr"))
+    assert output.open(str(folder / "ids.exr"), spec)
+    assert output.write_image(np.zeros((4, 4, 2), dtype=np.float32))
+    output.close()
+    (folder / "silent.dpx").write_bytes(b"SDPX" + b"\xff" * 3000)
+    (folder / ("x" * 250 + ".png")).write_bytes(good[:9])
     unreadable = "cannot be read as a picture: "
     return {
+        "ids.exr": "holds numbers of the type uint;",
+        "silent.dpx": unreadable,
+        "x" * 250 + ".png": unreadable,
         "cut.png": unreadable,
         "empty.png": unreadable,
         "text.png": unreadable,
@@ -186,6 +198,50 @@ def test_a_bad_file_is_one_line_and_the_others_are_compared(side: str, tmp_path:
         assert results[name].outcome is Outcome.FILE, name
         assert message in results[name].reason
         assert "\n" not in results[name].reason
+        assert not results[name].reason.endswith(": ")
+
+
+@pytest.mark.parametrize("suffix", ["png", "exr", "tif", "jpg", "hdr", "tga", "bmp"])
+def test_a_damaged_file_never_breaks_the_comparison(suffix: str, tmp_path: Path) -> None:
+    """A file of any format that is cut off, or has wrong bytes, is a result of one line."""
+    good = tmp_path / f"good.{suffix}"
+    pixels = oiio.ImageBuf(PNG.pixels)
+    assert pixels.write(str(good))
+    data, random = good.read_bytes(), np.random.default_rng(1)
+    cut = [data[: len(data) * share // 10] for share in range(6)]
+    outcomes = []
+    for index in range(40):
+        damaged = bytearray(cut[index] if index < len(cut) else data)
+        for place in random.integers(0, len(data), index - len(cut) + 1 if index >= len(cut) else 0):
+            damaged[place] ^= int(random.integers(1, 256))
+        bad = tmp_path / f"bad.{suffix}"
+        bad.write_bytes(damaged)
+        result = compare(good, bad, "exact")
+        assert "\n" not in result.reason
+        outcomes.append(result.outcome)
+    assert set(outcomes[: len(cut)]) == {Outcome.FILE}
+    assert Outcome.SAME not in outcomes[len(cut) :] or suffix in ("jpg", "tga", "tif")
+
+
+def test_a_folder_that_cannot_be_listed_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for side in ("reference", "test"):
+        for name in ("good.png", "locked/a.png", "locked/b.png", "locked.png"):
+            written(tmp_path / side / name)
+    list_folder = os.scandir
+
+    def refused(path: Any) -> Any:
+        if Path(path) == tmp_path / "test" / "locked":
+            raise PermissionError(13, "Permission denied", path)
+        return list_folder(path)
+
+    monkeypatch.setattr(os, "scandir", refused)
+    results = list(compare_folders(tmp_path / "reference", tmp_path / "test", RULES["codes"]()))
+    assert [(result.name, result.outcome) for result in results] == [
+        ("locked", Outcome.FILE),
+        ("good.png", Outcome.SAME),
+        ("locked.png", Outcome.SAME),
+    ]
+    assert results[0].reason == f"{tmp_path / 'test' / 'locked'}: the folder cannot be listed: Permission denied"
 
 
 def test_folders_by_relative_name(tmp_path: Path) -> None:

@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from glshade.golden.pair import Pair
 from glshade.golden.result import Metrics, Outcome
 from glshade.golden.rules import RULES
+from glshade.golden.rules.codes import Codes
+from glshade.image import file as picture_file
+from glshade.image.contents import PictureContents
 
 GREY = np.full((40, 40, 3), 100, dtype=np.uint8)
 RGB = ("R", "G", "B")
@@ -114,6 +122,32 @@ class TestCodes:
         assert outcome("codes", reference, test, ("A",)) is Outcome.SAME
         assert outcome("codes", reference, test, ("Y",)) is Outcome.FAIL
 
+    @pytest.mark.parametrize(
+        ("name", "channels", "ids"),
+        [
+            ("object_id", ("I",), True),
+            ("shapes", ("I",), True),
+            ("material_id", ("Y",), True),
+            ("beauty:object_id", ("X",), True),
+            ("CryptoObject00", ("R", "G", "B", "A"), True),
+            ("ViewLayer.uCryptoAsset01", ("r", "g", "b", "a"), True),
+            ("", ("object_id",), True),
+            ("", ("I",), False),
+            ("fluid", ("R", "G", "B"), False),
+            ("", ("R", "G", "B", "object_id"), False),
+        ],
+    )
+    def test_ids_must_be_equal(self, name: str, channels: tuple[str, ...], ids: bool) -> None:
+        """Cryptomatte's ids are floats of any size. A picture's colours that differ by as little are the same."""
+        reference = np.full((40, 40, len(channels)), 0.5, dtype=np.float32)
+        reference[::2] = 1e38
+        test = reference.copy()
+        test[7, 9] *= np.float32(1.0001)
+        finding = Codes().judge(Pair(name, channels, reference, test))
+        assert finding.outcome is (Outcome.FAIL if ids else Outcome.SAME)
+        assert finding.reason == ("1 of 1600 pixels differ; these are ids, which must be equal" if ids else "")
+        assert Codes().judge(Pair(name, channels, reference, reference.copy())).outcome is Outcome.SAME
+
     def test_codes_and_floats(self) -> None:
         linear = np.full((40, 40, 3), ((100 / 255 + 0.055) / 1.055) ** 2.4, dtype=np.float32)
         assert outcome("codes", GREY, linear) is Outcome.SAME
@@ -128,17 +162,19 @@ class TestIdiff:
         ("settings", "n", "expected"),
         [
             ({}, 1, Outcome.FAIL),
-            ({"fail": 0.6}, 100, Outcome.WARN),
+            ({"fail": 0.6}, 100, Outcome.SAME),
             ({"fail": 0.6, "warn": 0.6}, 100, Outcome.SAME),
             ({"fail": 0.4, "failpercent": 10}, 10, Outcome.WARN),
             ({"fail": 0.4, "failpercent": 10}, 11, Outcome.FAIL),
             ({"fail": 0.4, "failpercent": 10, "warn": 0.4, "warnpercent": 10}, 10, Outcome.SAME),
+            ({"fail": 0.4, "failpercent": 57}, 57, Outcome.WARN),
             ({"failpercent": 100, "warnpercent": 100, "hardfail": 0.4}, 1, Outcome.FAIL),
             ({"failpercent": 100, "warnpercent": 100, "hardfail": 0.6, "hardwarn": 0.4}, 1, Outcome.WARN),
             ({"failpercent": 100, "warnpercent": 100, "hardfail": 0.6, "hardwarn": 0.6}, 1, Outcome.SAME),
             ({"allowfailures": 3}, 3, Outcome.SAME),
             ({"allowfailures": 3}, 4, Outcome.FAIL),
-            ({"allowfailures": 3, "hardfail": 0.1}, 3, Outcome.SAME),
+            ({"allowfailures": 3, "hardfail": 0.1, "hardwarn": 0.1}, 3, Outcome.SAME),
+            ({"allowfailures": 3, "hardfail": 0.1, "failpercent": 100}, 4, Outcome.FAIL),
         ],
     )
     def test_thresholds(self, settings: dict[str, Any], n: int, expected: Outcome) -> None:
@@ -147,9 +183,41 @@ class TestIdiff:
         test.reshape(100, 3)[:n, 1] = 0.5
         assert outcome("idiff", reference, test, **settings) is expected
 
+    @pytest.mark.slow
+    @settings(max_examples=60)
+    @given(
+        errors=st.lists(st.sampled_from([0.1, 0.2, 0.3, 0.5]), min_size=1, max_size=40),
+        limits=st.dictionaries(
+            st.sampled_from(["fail", "warn", "hardfail", "hardwarn"]), st.sampled_from([0.05, 0.15, 0.25, 0.4, 0.6])
+        ),
+        shares=st.dictionaries(st.sampled_from(["failpercent", "warnpercent"]), st.sampled_from([0.5, 10, 25.5])),
+        allowed=st.integers(0, 12),
+    )
+    def test_the_real_idiff_agrees(
+        self, errors: list[float], limits: dict[str, float], shares: dict[str, float], allowed: int, tmp_path: Path
+    ) -> None:
+        """OpenImageIO installs its idiff beside Python."""
+        test = np.zeros((10, 10, 3), dtype=np.float32)
+        test.reshape(100, 3)[: len(errors), 1] = errors
+        chosen = {**limits, **shares, "allowfailures": allowed}
+        for name, pixels in (("a.exr", np.zeros_like(test)), ("b.exr", test)):
+            picture_file.write(tmp_path / name, PictureContents(pixels, "linear", premultiplied=True))
+        options = [text for key, value in chosen.items() for text in (f"-{key}", str(value))]
+        idiff = Path(sys.executable).with_name("idiff")
+        done = subprocess.run([idiff, *options, "a.exr", "b.exr"], cwd=tmp_path, capture_output=True, text=True)
+        assert done.stdout.splitlines()[-1] in ("PASS", "WARNING", "FAILURE")
+        assert outcome("idiff", np.zeros_like(test), test, **chosen) == done.returncode, done.stdout
+
     def test_codes_count_as_shares_of_255(self) -> None:
         assert outcome("idiff", GREY, GREY + 1, fail=1 / 254, warn=1 / 254) is Outcome.SAME
         assert outcome("idiff", GREY, GREY + 1, fail=1 / 256) is Outcome.FAIL
+
+
+def test_an_id_has_no_size() -> None:
+    """Cryptomatte's ids are floats of any size, and would be the largest differences of every file."""
+    reference = np.full((10, 10, 4), 1e30, dtype=np.float32)
+    test = changed(reference, (1, 2, [2e30, 1e30, 1e30, 1e30]), (3, 4, [1e30, 3, 1e-30, 1e30]))
+    assert Pair("CryptoObject00", ("R", "G", "B", "A"), reference, test).metrics() == Metrics(1.0, 2**0.5 / 10, 1.0, 3)
 
 
 @pytest.mark.parametrize("count", [0, 1, 3, 40, 1600])

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import html
+import re
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +11,10 @@ import numpy as np
 import pytest
 
 import glshade
+from glshade.image import file as picture_file
+from glshade.page.ramp import heat
 from glshade.verification.judgement import Expected, PixelClass, classify, judge
-from glshade.verification.report import Report, class_map, heat, write
+from glshade.verification.report import CLASS_COLOURS, CLASS_MEANING, UNEXPLAINED, Report, class_map, write
 
 SIZE = (4, 3)
 BACKGROUND = np.array([0.25, 0.5, 0.75, 1.0])
@@ -116,7 +120,9 @@ def test_shapes_must_agree() -> None:
 def classified(*candidates: tuple[float, float, bool, bool]) -> tuple[Any, PixelClass, bool]:
     """Returns (kept, class, open) of one pixel's candidates (depth, slack, partial, sealed)."""
     depth, slack, partial, sealed = (np.array(column) for column in zip(*candidates, strict=True))
-    kept, classes, open_, _ = classify(1, np.zeros(len(depth), dtype=int), depth, slack, partial, sealed)
+    kept, classes, open_, _ = classify(
+        1, np.zeros(len(depth), dtype=int), depth + slack, depth - slack, partial, np.where(sealed, 0, -1)
+    )
     return kept.tolist(), PixelClass(classes[0]), bool(open_[0])
 
 
@@ -172,8 +178,23 @@ def test_the_report_holds_everything(tmp_path: Path) -> None:
         *("result.exr", "reference.exr", "error.exr"),
     }
     assert text.count("data:image/png;base64,") == 4
-    assert "http" not in text, "the page needs nothing from elsewhere"
+    assert not re.search(r"https?:", text), "the page needs nothing from elsewhere"
     assert "&lt;title&gt;" in text
     assert "a &amp; b" in text
     assert "&lt;3&gt;" in text
     assert (class_map(classes, c.excess)[0, 3] == (255, 0, 60)).all()
+    assert all(CLASS_MEANING[kind] in html.unescape(text) for kind in PixelClass)
+
+
+def test_the_report_of_8_bit_pictures_shows_their_codes(tmp_path: Path) -> None:
+    pixels = np.full((SIZE[1], SIZE[0], 3), (10, 200, 30), dtype=np.uint8)
+    c = judge(picture(1.0, [3]), expected([3]))
+    page = write(tmp_path, Report("codes", "verified", [], pixels, pixels, c, c.error.astype(np.uint8), {}, [], []))
+    assert {path.name for path in page.parent.glob("*.exr")} == {"error.exr"}
+    path = tmp_path / "result.png"
+    assert (picture_file.read_part(path, picture_file.parts(path)[0]) == pixels).all()
+
+
+def test_every_class_has_its_own_colour() -> None:
+    assert set(CLASS_COLOURS) == set(CLASS_MEANING) == set(PixelClass)
+    assert len({*CLASS_COLOURS.values(), UNEXPLAINED}) == len(PixelClass) + 1

@@ -122,7 +122,7 @@ def test_a_hole_in_a_dense_mesh_is_found(renderer: Renderer) -> None:
     scene = view({"type": "sphere", "segments": 512, "rings": 256}, (80, 60))
     picture = renderer.render(scene, dtype="float32").pixels.copy()
     picture[30, 40] = 0
-    verdict = verify(scene, picture=picture)
+    verdict = verify(scene, picture=picture, renderer=renderer)
     assert (verdict.verdict, verdict.unexplained) == ("failed", 1)
 
 
@@ -154,7 +154,7 @@ def test_the_interval_holds_wherever_a_position_may_be(size: float, falloff: Any
     surface = replace(at_vertices(draw, np.zeros(count, dtype=np.intp), np.float64), position=middle - (1.2, 1.5, 3.5))
     error = np.full((count, 3), size) * (1, 1e-6, 1)
     value = evaluate_surface(draw, surface)
-    low, high, _ = bounds.over_box(draw, evaluate_surface, surface, "position", error, value, material_of(draw, surface))
+    low, high, _, _ = bounds.over_box(draw, evaluate_surface, surface, "position", error, value, material_of(draw, surface))
     for _ in range(200):
         moved = replace(surface, position=surface.position + random.uniform(-1, 1, (count, 3)) * error)
         light_there = evaluate_surface(draw, moved)

@@ -129,8 +129,11 @@ class TestCrop:
 
     def test_it_is_verified(self, renderer: Renderer, textured: Scene, layered: Scene) -> None:
         for scene in (textured, layered):
+            smooth = verify(on(scene, crop=CROPS[0], supersample=2, samples=4), renderer=renderer, max_ambiguous=1)
+            assert smooth.unexplained == 0
+            assert smooth.picture.shape[:2] == smooth.reference.shape[:2] == smooth.classes.shape == (41, 30)
             whole = verify(scene, renderer=renderer)
-            verdict = verify(on(scene, crop=CROPS[0], supersample=2, samples=4), renderer=renderer, max_ambiguous=1)
+            verdict = verify(on(scene, crop=CROPS[0]), renderer=renderer, max_ambiguous=1)
             assert verdict.verdict == "verified"
             assert verdict.picture.shape[:2] == verdict.reference.shape[:2] == verdict.classes.shape == (41, 30)
             assert np.array_equal(verdict.classes, cut(whole.classes, CROPS[0]))
@@ -140,10 +143,10 @@ class TestCrop:
         """The pixel is reported relative to the crop's corner."""
         scene = on(textured, crop=CROPS[0])
         picture = drawn(renderer, scene)
-        middle = np.argwhere(verify(scene, picture=picture).classes == 1)
+        middle = np.argwhere(verify(scene, picture=picture, renderer=renderer).classes == 1)
         y, x = map(int, middle[len(middle) // 2])
         picture[y, x] += 0.01
-        verdict = verify(scene, picture=picture)
+        verdict = verify(scene, picture=picture, renderer=renderer)
         assert (verdict.verdict, verdict.unexplained) == ("failed", 1)
         worst = verdict.worst_pixels[0]
         assert (worst.x, worst.y, worst.origin) == (x, y, "shading")

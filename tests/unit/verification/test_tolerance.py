@@ -14,7 +14,7 @@ import pytest
 import glshade
 from glshade.reference import bounds
 from glshade.reference.freedom import Freedom
-from glshade.verification.candidates import find_candidates
+from glshade.verification.candidates import find_candidates, one_sample
 from glshade.verification.judgement import PixelClass
 
 SCENES = Path(__file__).resolve().parents[3] / "scenes"
@@ -35,7 +35,7 @@ def tolerance(name: str, driver: Freedom) -> tuple[float, float]:
     """Returns (median, largest) half-width of the intervals of the scene's interior pixels, in linear light."""
     scene = glshade.load(SCENES / f"{name}.toml")
     scene = scene.model_copy(update={"film": scene.film.model_copy(update={"size": SIZE})})
-    expected = find_candidates(scene, driver=driver).expected
+    expected = find_candidates(one_sample(scene), driver=driver).expected
     interior = expected.classes[expected.pixel] == PixelClass.INTERIOR
     assert interior.sum() > 1000
     half_width = ((expected.high - expected.low) / 2)[interior, :3].max(axis=1)

@@ -1,0 +1,12 @@
+"""Regressions: faults that a comparison of pictures should find.
+
+Every module of this package adds its kinds to `kinds.REGRESSIONS` when it is imported. A new module is found by its presence.
+"""
+
+from importlib import import_module
+from pathlib import Path
+
+from glshade.bench.corpus.kinds import REGRESSIONS as REGRESSIONS
+
+for _module in sorted(path.stem for path in Path(__file__).parent.glob("[!_]*.py")):
+    import_module(f"{__name__}.{_module}")
