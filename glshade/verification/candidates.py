@@ -21,7 +21,7 @@ from glshade.scene.film import Film
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
 from glshade.verification.judgement import Expected, PixelClass
-from glshade.verification.pieces import Visible, visible
+from glshade.verification.pieces import Pieces, Visible, visible
 
 Array = NDArray[Any]
 Flags = NDArray[np.bool_]
@@ -132,6 +132,20 @@ def _freedom(film: Film, driver: Freedom) -> Freedom:
     return replace(driver, snap=driver.snap + 0.5 / film.samples)
 
 
+def _cut_by_depth(pieces: Pieces, solid: Pieces, inputs: Inputs) -> Flags:
+    """Returns whether each piece (N,) may have lost some of its samples to a surface that covers only some of them.
+
+    A driver may test the depth first, and then shade a triangle at the centroid of the samples that are left, although the
+    triangle covers the whole pixel.
+    """
+    if not inputs.extent:
+        return np.zeros(len(pieces.fragments), dtype=np.bool_)
+    width, height = inputs.size
+    cut = np.zeros(width * height, dtype=np.bool_)
+    cut[solid.fragments.pixel[solid.anywhere]] = True
+    return cut[pieces.fragments.pixel]
+
+
 @dataclass(frozen=True, eq=False)
 class _Shown:
     """The N candidates of a whole picture of P pixels, before any crop.
@@ -164,7 +178,8 @@ def _shown(inputs: Inputs, driver: Freedom) -> _Shown:
     classes, open_ = seen.classes.copy(), seen.open.copy()
     solid, over = seen.solid.fragments, seen.layers.fragments
     bounds, over_bounds = (
-        fragment_bounds(inputs, pieces.fragments, driver, pieces.anywhere) for pieces in (seen.solid, seen.layers)
+        fragment_bounds(inputs, pieces.fragments, driver, pieces.anywhere | _cut_by_depth(pieces, seen.solid, inputs))
+        for pieces in (seen.solid, seen.layers)
     )
     brightest = max((float(np.abs(b.value).max(initial=0.0)) for b in (bounds, over_bounds)), default=0.0)
     arriving = max((float(b.arriving.max(initial=0.0)) for b in (bounds, over_bounds)), default=0.0)

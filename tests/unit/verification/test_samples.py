@@ -249,3 +249,27 @@ def test_corners_on_a_coarse_grid_are_explained_by_a_driver_with_few_sub_pixel_b
 def test_the_reference_explains_its_own_picture_with_several_samples() -> None:
     smooth = scene(samples=4, background=(0.1, 0.2, 0.3))
     assert verdict_of(picture.render(smooth).pixels, find_candidates(smooth)).unexplained == 0
+
+
+@pytest.mark.parametrize("shading", ["gouraud", "phong"])
+def test_a_covered_pixel_whose_samples_are_hidden_in_part(shading: Any, renderer: g.Renderer) -> None:
+    """A driver may shade the triangle behind an outline at the centroid of the samples that the depth test leaves it."""
+
+    corners = np.array([[-1.0, -0.35, 0.01], [1.1, -0.3, 0.01], [0.9, 0.05, 0.01]])
+    places = np.array([[-1.2, -0.3, 0.0], [1.2, -0.3, 0.0], [0.0, 0.3, 0.0]])
+    # Behind the upper edge of the triangle in front, the colour grows with the distance from that edge, so that the value at the
+    # centroid of what is left lies beyond those at the pixel's centre and in front.
+    distance = places[:, 1] + 0.35 - 0.4 / 1.9 * (places[:, 0] + 1.0)
+    grey = np.repeat(0.5 + 0.8 * distance[:, None], 3, axis=1)
+    triangle = np.array([[0, 1, 2]])
+    behind = g.Mesh(places, triangle, colours=np.column_stack([grey, np.ones(3)]))
+    front = g.Mesh(corners, triangle, colours=np.array([[0.5, 0.5, 0.5, 1.0]] * 3))
+    white = {"brdf": "lambert", "kd": 1.0}
+    objects = [{"mesh": mesh, "material": white, "normals": "face"} for mesh in (front, behind)]
+    for order in (objects, objects[::-1]):
+        drawn = scene(order, samples=4)
+        candidates = find_candidates(drawn, shading=shading, driver=measure_freedom(renderer.context))
+        picture = renderer.render(drawn, dtype="float32", shading=shading).pixels.copy()
+        verdict = verdict_of(picture, candidates)
+        assert verdict.unexplained == 0, verdict
+        assert np.isin(candidates.expected.classes, (PixelClass.SEAM, PixelClass.EDGE)).sum() > 20
