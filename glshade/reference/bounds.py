@@ -421,6 +421,9 @@ def _per_vertex(draw: Draw, fragments: Fragments, planes: Planes, extent: float)
             result["value"][indices], interpolation[indices] = middle[indices], (half + error)[indices]
         else:
             interpolation[indices] = planes.errors(table[planes.corners], 0.0)[indices]
+    # A driver flushes the slope of a plane equation to 0 if it is smaller than TINY, and in perspective it interpolates light
+    # divided by w. Across the picture, this slope adds up.
+    interpolation += TINY * sum(planes.size) * max(1.0, float(np.abs(draw.clip[:, 3]).max(initial=0.0)))
     result["below"], result["above"] = result["below"] + interpolation, result["above"] + interpolation
     return result
 

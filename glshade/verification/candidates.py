@@ -133,15 +133,15 @@ def _freedom(film: Film, driver: Freedom) -> Freedom:
 
 
 def _cut_by_depth(pieces: Pieces, solid: Pieces, inputs: Inputs) -> Flags:
-    """Returns whether each piece (N,) may have lost some of its samples to a surface that covers only some of them.
+    """Returns whether each piece (N,) may have lost some of its samples to another surface of its pixel.
 
-    A driver may test the depth first, and then shade a triangle at the centroid of the samples that are left, although the
-    triangle covers the whole pixel.
+    That surface covers only some of them, or the two surfaces cross within the pixel. A driver may test the depth first, and
+    then shade a triangle at the centroid of the samples that are left, although the triangle covers the whole pixel.
     """
     if not inputs.extent:
         return np.zeros(len(pieces.fragments), dtype=np.bool_)
     width, height = inputs.size
-    cut = np.zeros(width * height, dtype=np.bool_)
+    cut: Flags = np.bincount(solid.fragments.pixel, minlength=width * height) > 1
     cut[solid.fragments.pixel[solid.anywhere]] = True
     return cut[pieces.fragments.pixel]
 

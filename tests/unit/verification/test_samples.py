@@ -257,7 +257,7 @@ def test_a_covered_pixel_whose_samples_are_hidden_in_part(shading: Any, renderer
 
     corners = np.array([[-1.0, -0.35, 0.01], [1.1, -0.3, 0.01], [0.9, 0.05, 0.01]])
     places = np.array([[-1.2, -0.3, 0.0], [1.2, -0.3, 0.0], [0.0, 0.3, 0.0]])
-    # Behind the upper edge of the triangle in front, the colour grows with the distance from that edge, so that the value at the
+    # Behind the upper edge of the triangle in front, the colour grows with the distance from that edge. So the value at the
     # centroid of what is left lies beyond those at the pixel's centre and in front.
     distance = places[:, 1] + 0.35 - 0.4 / 1.9 * (places[:, 0] + 1.0)
     grey = np.repeat(0.5 + 0.8 * distance[:, None], 3, axis=1)
@@ -273,3 +273,32 @@ def test_a_covered_pixel_whose_samples_are_hidden_in_part(shading: Any, renderer
         verdict = verdict_of(picture, candidates)
         assert verdict.unexplained == 0, verdict
         assert np.isin(candidates.expected.classes, (PixelClass.SEAM, PixelClass.EDGE)).sum() > 20
+
+
+@pytest.mark.parametrize("shading", ["gouraud", "phong"])
+def test_surfaces_that_cross_within_a_pixel(shading: Any, renderer: g.Renderer) -> None:
+    """Both cover the pixel whole, but the depth test leaves each only some of its samples."""
+    triangle = np.array([[0, 1, 2]])
+    level = np.array([[-1.5, -0.6, 0.0], [1.5, -0.6, 0.0], [0.0, 0.9, 0.0]])
+    # The second triangle cuts the first one along a slanted line, beside which its own colour grows quickly.
+    leaning = level + np.array([[0, 0, -0.5], [0, 0, 0.4], [0, 0, 0.3]])
+    grey = np.repeat((0.5 + 1.0 * leaning[:, 2])[:, None], 3, axis=1)
+    first = g.Mesh(level, triangle, colours=np.array([[0.5, 0.5, 0.5, 1.0]] * 3))
+    second = g.Mesh(leaning, triangle, colours=np.column_stack([grey, np.ones(3)]))
+    white = {"brdf": "lambert", "kd": 1.0}
+    light = [{"type": "directional", "direction": (0, 0, -1), "intensity": 0.2}]
+    objects = [{"mesh": mesh, "material": white, "normals": "face"} for mesh in (first, second)]
+    for order in (objects, objects[::-1]):
+        drawn = scene(order, lights=light, samples=4)
+        candidates = find_candidates(drawn, shading=shading, driver=measure_freedom(renderer.context))
+        picture = renderer.render(drawn, dtype="float32", shading=shading).pixels.copy()
+        verdict = verdict_of(picture, candidates)
+        assert verdict.unexplained == 0, verdict
+
+
+def test_slopes_below_the_smallest_normal_number(renderer: g.Renderer) -> None:
+    """A driver flushes the slope of light so faint that it changes by less than float32 holds from pixel to pixel."""
+    lights = [{"type": "point", "position": (0.5, 3.0, 4.0), "falloff": "none", "intensity": -2e-35}]
+    ball = {"shape": {"type": "sphere", "segments": 48, "rings": 24}, "material": SHINY, "shading": "gouraud"}
+    verdict = g.verify(scene([ball], lights=lights, size=(240, 160), samples=1), renderer=renderer)
+    assert verdict.unexplained == 0, verdict
