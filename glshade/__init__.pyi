@@ -2,6 +2,10 @@
 
 from glshade import reference as reference
 from glshade.brdfs import BRDFS as BRDFS
+from glshade.debug.pixels import PixelTrace as PixelTrace
+from glshade.debug.pixels import trace_pixel as trace_pixel
+from glshade.debug.tracing import Trace as Trace
+from glshade.debug.tracing import trace as trace
 from glshade.errors import AssetError as AssetError
 from glshade.errors import ContextError as ContextError
 from glshade.errors import GlshadeError as GlshadeError

@@ -33,6 +33,8 @@ from support.extremes import (  # noqa: E402
 
 from glshade import BRDFS, Renderer  # noqa: E402
 from glshade.brdfs import Brdf  # noqa: E402
+from glshade.catalogue.digits import digits_of_model  # noqa: E402
+from glshade.spirv.digits import MENTIONED, LineLoss  # noqa: E402
 
 PAGE = ROOT / "docs" / "accuracy.md"
 # How many materials of each model are measured: at the extremes, in addition to those that vary a single parameter, and within
@@ -80,6 +82,26 @@ within {factor:g} x conditioning.
 
 {ordinary}"""
 
+DIGITS = """\
+## Line by line
+
+`glshade digits` ([digits.md](digits.md)) runs each model's GLSL at random parameters and directions of its whole domain, and
+rounds the operations of one line at a time as float32 rounds them. The table has the lines that change the result by more than
+{mentioned:g} where rounding the inputs changes it by less than a quarter of that. The column "exact functions" is the change if
+built-in functions err by no more than an addition does. Changes are relative to the result; values below 0.001 count as 0.001.
+
+{lines}"""
+
+# (file, text of a line that is to blame) -> the reason for which it stays.
+REASONS = {
+    ("math/cos_half.glsl", "return c > 0.7 ? 1.0 - 0.25 * dot(q, q) / (1.0 + c) : c;"): (
+        "Total reflection starts at a cosine of 0.9999 where eta is near 0.01 and k is 0. Fresnel's reflectance changes there "
+        "like a square root. No metal has such an index."
+    ),
+}
+# Built-in functions, and the division, to which OpenGL allows more than the error of a rounding.
+FUNCTIONS = re.compile(r"\b(sqrt|inversesqrt|length|normalize|pow|exp2?|log2?)\(|(?<!/)/(?!/)")
+
 
 def bounds(name: str) -> float:
     """Returns the bound that the contract tests check for the model, in units of the conditioning."""
@@ -120,7 +142,7 @@ def page() -> str:
             extremes.append((f"`{name}`", f"{bounds(name):g}", *figures, *there[:2], f"{there[2]:.1e}", f"{worst.value:.1e}"))
             usuals.append((f"`{name}`", f"{ORDINARY:g}", *(f"{common[stage].value:.1e}" for stage in STAGES)))
     own = ", ".join(f"{name}: {bounds(name):g}" for name in BRDFS if bounds(name) != FACTOR)
-    return TEXT.format(
+    measured_text = TEXT.format(
         driver=driver,
         strong=STRONG,
         factor=FACTOR,
@@ -132,6 +154,49 @@ def page() -> str:
         ),
         ordinary=table(("model", "bound", *STAGES), usuals),
     )
+    return f"{measured_text}\n{digits()}"
+
+
+def digits() -> str:
+    """Returns the section about the digits that lines lose, measured now. Errors: KeyError for a line without a reason."""
+    rows = []
+    for name, loss in lost():
+        file, line = where(loss)
+        reason = REASONS[file, loss.text] if loss.to_blame else allowed(loss.text)
+        figures = (f"{x:.1e}" for x in (loss.loss, loss.formula, loss.inputs))
+        rows.append((f"`{name}`", f"{file}:{line}", *figures, f"`{loss.text}`", reason))
+    heading = ("model", "line", "loses", "exact functions", "rounded inputs", "text", "reason")
+    return DIGITS.format(mentioned=MENTIONED, lines=table(heading, rows))
+
+
+def lost() -> list[tuple[str, LineLoss]]:
+    """Returns (model, line) for the lines that lose more than MENTIONED and more than rounding the inputs does."""
+    found = ((name, digits_of_model(model).lines) for name, model in BRDFS.items())
+    return [(name, loss) for name, lines in found for loss in lines if loss.loss > MENTIONED and not loss.ill_posed]
+
+
+def where(loss: LineLoss) -> tuple[str, int]:
+    """Returns the file below shaders/, and the line in it."""
+    file, _, line = loss.place.rpartition(":")
+    return Path(file).relative_to(ROOT / "shaders").as_posix(), int(line)
+
+
+def allowed(text: str) -> str:
+    """Returns the reason for which a line is not to blame: the functions to which OpenGL allows larger errors."""
+    names = dict.fromkeys(f"`{match[1]}`" if match[1] else "a division" for match in FUNCTIONS.finditer(text.split("//")[0]))
+    return f"OpenGL allows {' and '.join(names)} more than a rounding."
+
+
+def moved(text: str) -> list[str]:
+    """Returns the rows of the page's last table whose text does not stand at their place in shaders/."""
+    rows = re.findall(r"^\| `\w+` \| ([\w./]+):(\d+) \|.*?\| `(.*)` \|", text, flags=re.MULTILINE)
+    stale = []
+    for file, line, quoted in rows:
+        path = ROOT / "shaders" / file
+        lines = path.read_text(encoding="utf-8").splitlines() if path.exists() else []
+        if int(line) > len(lines) or lines[int(line) - 1].strip() != quoted.replace("\\|", "|"):
+            stale.append(f"{file}:{line}")
+    return stale or ([] if rows else ["no line"])
 
 
 def parameters(material: Brdf) -> str:
@@ -145,11 +210,19 @@ def parameters(material: Brdf) -> str:
 
 def models(text: str) -> list[list[str]]:
     """Returns the names of the models that have a row, for each table of the page."""
-    return [re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE) for part in text.split("\n## ")[1:]]
+    return [re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE) for part in text.split("\n## ")[1:3]]
 
 
 if __name__ == "__main__":
     if sys.argv[1:] == ["--check"]:
-        current = PAGE.exists() and models(PAGE.read_text(encoding="utf-8")) == [list(BRDFS)] * 2
-        sys.exit(0 if current else "docs/accuracy.md has other models than glshade/brdfs: run script/make-accuracy")
+        kept = PAGE.read_text(encoding="utf-8") if PAGE.exists() else ""
+        if models(kept) != [list(BRDFS)] * 2:
+            sys.exit("docs/accuracy.md has other models than glshade/brdfs: run script/make-accuracy")
+        if moved(kept):
+            places = ", ".join(moved(kept))
+            sys.exit(f"docs/accuracy.md quotes lines that have changed ({places}): run script/make-accuracy --digits")
+        sys.exit()
+    if sys.argv[1:] == ["--digits"]:
+        write(PAGE, PAGE.read_text(encoding="utf-8").split("\n## Line by line")[0].rstrip("\n") + f"\n\n{digits()}")
+        sys.exit()
     write(PAGE, page())

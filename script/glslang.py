@@ -17,9 +17,8 @@ from typing import get_args
 
 from glshade.assembly.assembly import assemble
 from glshade.brdfs import BRDFS
-from glshade.gl.evaluation import generated
 from glshade.glsl.coverage import every_light, plan_of_model
-from glshade.glsl.generator import generate
+from glshade.glsl.generator import generate, value_code
 from glshade.glsl.plan import ProgramPlan, Use, Viewer
 from glshade.glsl.planner import plan
 from glshade.glsl.shaders import SHIPPED, expand
@@ -71,7 +70,7 @@ def sources() -> Iterator[Source]:
         yield Source(expand("pass/picture.vert", {}), expand("pass/picture.frag", output))
     for name in BRDFS:
         for material in at_extremes(name, 48):
-            code = generated(material)
+            code = value_code(material)
             # main() drops stages that are equal.
             yield Source(expand("pass/evaluate.vert", code), expand("pass/evaluate.frag", code))
 

@@ -85,7 +85,10 @@ def _show(model: dict[str, Any]) -> None:
         )
     click.echo()
     if not model["reference"]:
-        _table.paragraph("none: the model has only a GLSL file, so its pictures and laws cannot be verified", "reference")
+        _table.paragraph(
+            "none: the model has only a GLSL file, so its pictures are verified against that file, and its laws are not known",
+            "reference",
+        )
     for law, kept in model["laws"].items() if model["reference"] else ():
         _table.paragraph(
             f"kept: {listing.LAWS[law]}" if kept["promised"] else f"broken: {kept['reason']}",

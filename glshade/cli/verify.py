@@ -30,6 +30,11 @@ if TYPE_CHECKING:
 @click.option(
     "--report", type=click.Path(path_type=Path, file_okay=False), help="Writes a page with the evidence to this folder."
 )
+@click.option(
+    "--derived",
+    is_flag=True,
+    help="Compares with the GLSL itself, run in float64 on the CPU, and not with the models' Python functions.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Prints the verdict as JSON.")
 @click.option(
     "--max-ambiguous",
@@ -57,6 +62,7 @@ def command(
     overrides: list[tuple[str, str]],
     limits: Limits,
     report: Path | None,
+    derived: bool,
     as_json: bool,
     max_ambiguous: float,
     mutate: str | None,
@@ -76,12 +82,18 @@ def command(
 
     loaded = filmed(load(scene, overrides, limits=limits), {"size": size})
     if mutate is not None:
-        _mutate(loaded, mutate, backend, device, shaders, shading, as_json)
+        _mutate(loaded, mutate, backend, device, shaders, shading, derived, as_json)
         return
     from glshade.verification.verification import verify
 
     verdict = verify(
-        loaded, backend=backend, device=device, shaders=shaders, shading=shading, max_ambiguous=max_ambiguous / 100
+        loaded,
+        backend=backend,
+        device=device,
+        shaders=shaders,
+        shading=shading,
+        max_ambiguous=max_ambiguous / 100,
+        derived=derived,
     )
     page = verdict.report(report, scene.name) if report is not None else None
     if as_json:
@@ -96,7 +108,14 @@ def command(
 
 
 def _mutate(
-    scene: Scene, name: str, backend: Any, device: int | None, shaders: tuple[str, ...], shading: Any, as_json: bool
+    scene: Scene,
+    name: str,
+    backend: Any,
+    device: int | None,
+    shaders: tuple[str, ...],
+    shading: Any,
+    derived: bool,
+    as_json: bool,
 ) -> None:
     """Plants faults, one mutation at a time, and prints for each whether verify notices it.
 
@@ -111,7 +130,9 @@ def _mutate(
     if name != "all" and name not in MUTATIONS:
         raise click.BadParameter(f"no mutation is named {name!r}{nearest(name, MUTATIONS)}", param_hint="'--mutate'")
     with Renderer(backend, device, shaders=shaders) as renderer:
-        trials = try_mutations(scene, MUTATIONS if name == "all" else [name], renderer=renderer, shading=shading)
+        trials = try_mutations(
+            scene, MUTATIONS if name == "all" else [name], renderer=renderer, shading=shading, derived=derived
+        )
     survived = [trial for trial in trials if trial.shows and not trial.caught]
     if as_json:
         import json

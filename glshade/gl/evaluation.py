@@ -1,7 +1,8 @@
-"""Evaluation: `evaluate`, which computes one reflectance model at given directions, in float64 on the CPU or in a GPU stage."""
+"""Evaluation: `evaluate`, which computes one reflectance model at given directions, on the CPU or in a stage on the GPU."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, Literal
 
 import moderngl
@@ -11,13 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from glshade.brdfs import Brdf, numbers, widened
 from glshade.gl.context import Context, open_context
 from glshade.gl.program import Program
-from glshade.glsl.generator import model_code
+from glshade.glsl.generator import value_code
 from glshade.glsl.shaders import Shaders, current, expand
-from glshade.glsl.source import Code, Source
+from glshade.glsl.source import Code, Rewrite, Source
 from glshade.glsl.uniforms import Values
 from glshade.scene.models import Folders, paths, use_models
 
-On = Literal["reference", "vertex", "fragment"]
+On = Literal["reference", "text", "vertex", "fragment"]
 
 
 def evaluate(
@@ -36,51 +37,73 @@ def evaluate(
     l: unit directions (..., 3) to the light, of any leading shape, in the local frame, where the normal is +z and the tangent
         is +x. They are first rounded to float32.
     v: unit directions (..., 3) to the viewer in the same frame, rounded in the same way. l and v are broadcast to one shape.
-    on: "reference" for float64 on the CPU; "vertex" or "fragment" for float32 in that stage on the GPU.
+    on: "reference" for the model's Python function in float64; "text" for its GLSL in float64, run without a GPU; "vertex" or
+        "fragment" for its GLSL in float32 in that stage on the GPU.
     context: optional; the context to use. Default: a new one for this call.
     shaders: optional; the user's shader folders, as for Renderer.
     models: optional; the user's model folders, as for Renderer.
-    Errors: ValueError, ContextError, ShaderError, SceneError.
+    Errors: ValueError, ContextError, ShaderError, SceneError; MissingLibrary where `on` is "text" and glslangValidator is not
+    installed.
     """
     use_models(models)
     l, v = np.broadcast_arrays(np.asarray(l, dtype=np.float32), np.asarray(v, dtype=np.float32))
     if l.shape[-1:] != (3,):
         raise ValueError(f"l and v must have shape (..., 3), not {l.shape}")
-    values = numbers(brdf)
+    values = {f"u_{name}": value for name, value in numbers(brdf).items()}
     if on == "reference":
         result: NDArray[Any] = type(brdf).brdf_cos(widened(brdf), l.astype(np.float64), v.astype(np.float64))
         return result
+    if on == "text":
+        from glshade.spirv.model import evaluate_text
+
+        return evaluate_text(brdf, l.reshape(-1, 3), v.reshape(-1, 3), current(paths(shaders))).reshape(l.shape)
     if on not in ("vertex", "fragment"):
-        raise ValueError(f'on must be "reference", "vertex" or "fragment", not {on!r}')
+        raise ValueError(f'on must be "reference", "text", "vertex" or "fragment", not {on!r}')
     if l.size == 0:
         return np.zeros(l.shape, dtype=np.float32)
     opened = context or open_context()
     try:
-        stage = _in_vertex_stage if on == "vertex" else _in_fragment_stage
-        with opened.gl:
-            flat = stage(opened, current(paths(shaders)), brdf, values, l.reshape(-1, 3), v.reshape(-1, 3))
-            # This frees the program, textures and buffers of the call.
-            opened.gl.gc()
+        flat = run_on_gpu(opened, on, value_code(brdf), values, l.reshape(-1, 3), v.reshape(-1, 3), current(paths(shaders)))
         return flat.reshape(l.shape)
     finally:
         if context is None:
             opened.release()
 
 
-def generated(brdf: Brdf) -> dict[str, Code]:
-    """Place -> code, for a program that evaluates a model. In the local frame, `vec3 value(vec3 l, vec3 v)` returns f cos."""
-    return model_code(
-        brdf, "vec3 value(vec3 l, vec3 v)", "Frame(vec3(0.0, 0.0, 1.0), vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0))"
-    )
-
-
-def _in_vertex_stage(
-    context: Context, shaders: Shaders, brdf: Brdf, values: Values, l: NDArray[Any], v: NDArray[Any]
+def run_on_gpu(
+    context: Context,
+    on: Literal["vertex", "fragment"],
+    code: Mapping[str, Code | str],
+    values: Values,
+    l: NDArray[Any],
+    v: NDArray[Any],
+    shaders: Shaders,
+    rewrite: Rewrite = lambda source: source,
 ) -> NDArray[np.float32]:
-    source = Source(expand("pass/evaluate.vert", generated(brdf), shaders), None)
+    """Returns the values (N, 3) of a function of two directions, run in float32 in a stage on the GPU.
+
+    code: place -> code; the place `model` defines `vec3 value(vec3 l, vec3 v)`.
+    values: name -> value of the uniforms.
+    l, v: the directions (N, 3).
+    rewrite: optional; changes the text before it is compiled.
+    Errors: ShaderError.
+    """
+    if on == "vertex":
+        source = Source(expand("pass/evaluate.vert", code, shaders), None)
+    else:
+        source = Source(expand("pass/picture.vert", {}, shaders), expand("pass/evaluate.frag", code, shaders))
+    stage = _in_vertex_stage if on == "vertex" else _in_fragment_stage
+    with context.gl:
+        result = stage(context, rewrite(source), values, l.astype(np.float32), v.astype(np.float32))
+        # This frees the program, textures and buffers of the call.
+        context.gl.gc()
+    return result
+
+
+def _in_vertex_stage(context: Context, source: Source, values: Values, l: NDArray[Any], v: NDArray[Any]) -> NDArray[np.float32]:
     program = Program(context, source, varyings=("v_value",))
     for name, value in values.items():
-        program.write(f"u_{name}", value)
+        program.write(name, value)
     gl = context.gl
     names = [name for name in ("a_l", "a_v") if name in program.attributes]
     content = [(gl.buffer({"a_l": l, "a_v": v}[name].tobytes()), "3f", name) for name in names]
@@ -92,12 +115,11 @@ def _in_vertex_stage(
 
 
 def _in_fragment_stage(
-    context: Context, shaders: Shaders, brdf: Brdf, values: Values, l: NDArray[Any], v: NDArray[Any]
+    context: Context, source: Source, values: Values, l: NDArray[Any], v: NDArray[Any]
 ) -> NDArray[np.float32]:
-    source = Source(expand("pass/picture.vert", {}, shaders), expand("pass/evaluate.frag", generated(brdf), shaders))
     program = Program(context, source)
     for name, value in values.items():
-        program.write(f"u_{name}", value)
+        program.write(name, value)
     gl = context.gl
     width = min(len(l), 4096)
     height = -(-len(l) // width)

@@ -19,8 +19,8 @@ from glshade.gl.frame import FORMATS, Storage
 from glshade.gl.program import Program
 from glshade.gl.resources import Resources, texture_size
 from glshade.glsl.generator import generate
-from glshade.glsl.plan import PAGE, LightGroup, ProgramPlan
-from glshade.glsl.planner import plan_instance, with_equals
+from glshade.glsl.plan import PAGE, ProgramPlan
+from glshade.glsl.planner import further_plan, plan_instance
 from glshade.glsl.shaders import Shaders
 from glshade.glsl.source import Rewrite
 from glshade.glsl.uniforms import Values, ambient_radiance, light_pages, light_uniforms, object_uniforms, textures
@@ -200,7 +200,7 @@ class _Calls:
         assembly = self._assembly
         triangles = _sorted_triangles(instance, assembly) if plan.alpha == "blend" else facing(instance, assembly.view)
         for index in range(max((len(group) for group in pages), default=1)):
-            page_plan = plan if index == 0 else _further(plan, instance, pages, index)
+            page_plan = plan if index == 0 else further_plan(plan, instance, [len(group) for group in pages], index)
             program = self._program(page_plan)
             values = object_uniforms(page_plan, instance, assembly.view.eye)
             if page_plan.ambient == "constant":
@@ -223,7 +223,7 @@ class _Calls:
     def _pages(self, plan: ProgramPlan, instance: Instance) -> list[list[Page]]:
         """Returns the pages of lights of each group that has no exact count."""
         result = []
-        for group in _paged(plan):
+        for group in plan.paged:
             lights = [self._assembly.lights[i] for i in instance.lights if group.holds(self._assembly.lights[i])]
             records = light_pages(group, lights, self._assembly.view.eye, self._exposure, PAGE)
             whole = PAGE * records[0].dtype.itemsize
@@ -237,27 +237,6 @@ def _mesh_size(mesh: Mesh) -> int:
     All attributes of a vertex together count as three times its position.
     """
     return 2 * (mesh.triangles.nbytes + 3 * mesh.positions.nbytes)
-
-
-def _paged(plan: ProgramPlan) -> list[LightGroup]:
-    return [group for group in plan.lights if group.count == 0]
-
-
-def _further(plan: ProgramPlan, instance: Instance, pages: list[list[Page]], index: int) -> ProgramPlan:
-    """Returns the plan of a further page of lights. The first call has already drawn ambient light and groups with an exact
-    count.
-
-    plan: the plan of the first call.
-    instance: the instance that is drawn.
-    pages: the pages of each group without an exact count.
-    index: the number of the page, from 1.
-    """
-    groups = tuple(group for group, group_pages in zip(_paged(plan), pages, strict=True) if index < len(group_pages))
-    asked: set[str] = set()
-    for group in groups:
-        asked |= with_equals(instance.material, instance.material.asked("ambient" if group.omnidirectional else "light"))
-    parameters = tuple((name, use if name in asked else "unused") for name, use in plan.parameters)
-    return replace(plan, lights=groups, ambient="none", parameters=parameters)
 
 
 def _check_finite(instance: Instance, values: Values) -> None:

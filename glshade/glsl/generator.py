@@ -98,6 +98,12 @@ def model_code(brdf: Brdf, function: str, frame: str) -> dict[str, Code]:
     return {**slot_code(brdf.slots()), "model": code}
 
 
+def value_code(brdf: Brdf) -> dict[str, Code]:
+    """Place -> code, for a program that evaluates a model. In the local frame, `vec3 value(vec3 l, vec3 v)` returns f cos."""
+    frame = "Frame(vec3(0.0, 0.0, 1.0), vec3(1.0, 0.0, 0.0), vec3(0.0, 1.0, 0.0))"
+    return model_code(brdf, "vec3 value(vec3 l, vec3 v)", frame)
+
+
 def without_unreached(stage: Stage) -> Stage:
     """Returns the stage without the functions, structs and constants that main() does not reach."""
     lines = stage.text.splitlines()

@@ -179,6 +179,11 @@ class ProgramPlan:
         """Whether the shading reads any texture."""
         return bool(self.textured) or self.normal_map or self.direction_map or self.shows == "uv"
 
+    @property
+    def paged(self) -> tuple[LightGroup, ...]:
+        """The groups of lights that are read a page at a time."""
+        return tuple(group for group in self.lights if group.count == 0)
+
     def picture_of(self, name: str) -> str:
         """Returns the parameter under whose name the texture of `name` is bound."""
         return dict(self.shared).get(name, name)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from typing import Literal
 
 from glshade.assembly.assembly import Assembly
@@ -100,6 +101,23 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         normalise=instance.quality.normalise is not False or not groups or instance.rate != "phong" or bumpy or tangents,
         arithmetic=(instance.quality.arithmetic if groups else None) or "stable",
     )
+
+
+def further_plan(plan: ProgramPlan, instance: Instance, pages: Sequence[int], index: int) -> ProgramPlan:
+    """Returns the plan of a further page of lights. The first call has already drawn ambient light and groups with an exact
+    count.
+
+    plan: the plan of the first call.
+    instance: the instance that is drawn.
+    pages: the number of pages of each of plan.paged.
+    index: the number of the page, from 1.
+    """
+    groups = tuple(group for group, count in zip(plan.paged, pages, strict=True) if index < count)
+    asked: set[str] = set()
+    for group in groups:
+        asked |= with_equals(instance.material, instance.material.asked("ambient" if group.omnidirectional else "light"))
+    parameters = tuple((name, use if name in asked else "unused") for name, use in plan.parameters)
+    return replace(plan, lights=groups, ambient="none", parameters=parameters)
 
 
 def _groups(lights: Iterable[Light]) -> tuple[LightGroup, ...]:

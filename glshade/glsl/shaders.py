@@ -133,6 +133,10 @@ class Shaders:
             yield SHIPPED / FAST / name
         yield SHIPPED / name
 
+    def lines(self, path: str) -> tuple[str, ...]:
+        """Returns the text of a file that was looked up before, line by line; nothing for another path."""
+        return next((file.lines for file in self._files.values() if file is not None and str(file.path) == path), ())
+
     def read_own(self) -> None:
         """Reads all files of the user's folders, so that later changes of these files do not show. Errors: ShaderError."""
         names = {name for folder in self.own for name in _names(folder)}

@@ -242,10 +242,16 @@ class SceneJudge:
 
     def _candidates_of(self, case: _Case, origin: Origin) -> Candidates:
         """Returns what the reference allows a picture of this origin to show. Errors: NoReference, SceneError."""
+        from glshade.glsl.shaders import current
+        from glshade.scene.models import paths
         from glshade.verification.candidates import find_candidates, judgeable
 
         freedom = self._freedom(origin)
-        return _kept(self._candidates, (case.name, freedom), lambda: find_candidates(judgeable(case.scene), driver=freedom))
+
+        def find() -> Candidates:
+            return find_candidates(judgeable(case.scene), driver=freedom, shaders=current(paths(self._shaders)))
+
+        return _kept(self._candidates, (case.name, freedom), find)
 
     def _loaded(self, reference: Origin) -> tuple[Scene, str]:
         """Returns the scene of a pair, and its name for messages. Errors: SceneError."""

@@ -47,13 +47,16 @@ from glshade.live.messages import (
     Loaded,
     Pick,
     Picked,
+    ReadSource,
     Restore,
     Save,
     Saved,
+    Source,
     View,
 )
 from glshade.live.revision import Copies, Revision, read
 from glshade.live.snapshot import Snapshot, restored
+from glshade.live.source import source_files
 from glshade.live.views import Views
 from glshade.live.worker import RenderWorker
 from glshade.problem import Problem
@@ -89,6 +92,7 @@ class Drawer(RenderWorker):
             Draw: self._draw,
             Save: self._save,
             Pick: self._pick,
+            ReadSource: self._source,
         }
         self._folder = Path(folder)
         # The copies of an earlier drawer stay, because the snapshot may name them.
@@ -341,6 +345,15 @@ class Drawer(RenderWorker):
         draw = self.renderer.layers if revision.scene.film.aovs else self.renderer.render
         draw(revision.scene, dtype="float32" if format_of(request.path).floats else "uint8").save(request.path)
         return Saved(id=request.id, revision=revision.number)
+
+    def _source(self, request: ReadSource) -> Answer:
+        if self._views is None:
+            raise SceneError("there is no picture yet")
+        revision, view = self._views.revision, request.view
+        revision.draw_with(self.renderer)
+        scene = self._views.shown({**view, "layer": None}).scene
+        name, files = source_files(scene, request.object, revision.shaders, view.get("shading"))
+        return Source(id=request.id, object=request.object, name=name, files=files, revision=revision.number)
 
     def _pick(self, request: Pick) -> Answer:
         if self._views is None:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.debug.pixels import Pixels, Variable
 from glshade.driver.freedom import measure_freedom
 from glshade.errors import NoReference, SceneError
 from glshade.image.image import Image
@@ -24,15 +25,21 @@ from glshade.live.messages import (
     Heat,
     Judged,
     Loaded,
+    LostDigits,
+    MeasureDigits,
     Probe,
     Probed,
     Reference,
     Request,
     Restore,
+    ShowVariable,
+    Trace,
+    Traced,
     Verify,
     View,
 )
 from glshade.live.snapshot import restored
+from glshade.live.variables import hexadecimal, line_tables, step_tables, variable_picture
 from glshade.live.views import Views
 from glshade.live.worker import RenderWorker
 from glshade.page.ramp import RAMP, heat
@@ -80,14 +87,19 @@ class Judge(RenderWorker):
             Probe: self._probe,
             Reference: self._reference,
             Heat: self._heat,
+            Trace: self._trace,
+            ShowVariable: self._variable,
+            MeasureDigits: self._digits,
         }
         self._views: Views | None = None
         # The last view that was judged, because a probe or a heat map of the same view often follows.
         self._last: tuple[Scene, str | None, Trial] | None = None
+        # The last view whose programs were run on the CPU.
+        self._pixels: tuple[Scene, str | None, Pixels] | None = None
 
     def _restore(self, request: Restore) -> Answer:
         revision = restored(Path(request.folder))
-        self._views, self._last = Views(revision), None
+        self._views, self._last, self._pixels = Views(revision), None, None
         return Loaded(id=request.id, revision=revision.number, shown=revision.number, snapshot=request.folder)
 
     def _verify(self, request: Verify) -> Answer:
@@ -103,6 +115,7 @@ class Judge(RenderWorker):
             id=request.id,
             verdict=verdict.verdict,
             text=_sentence(trial),
+            derived=trial.verdict.derived,
             unexplained=verdict.unexplained,
             ambiguous=ambiguous,
             pixels=[(int(x), int(y)) for x, y in zip(columns[:LISTED], rows[:LISTED], strict=True)],
@@ -145,7 +158,11 @@ class Judge(RenderWorker):
         start = perf_counter()
         scene, shading = self._scene(request.view)
         film = scene.film
-        image = render(scene, shading=shading)
+        try:
+            image = render(scene, shading=shading)
+        except NoReference:
+            # The value in the middle of what the model's own text allows takes the place of a reference.
+            image = Image(self._trial(request.view).verdict.reference)
         shown = displayed(image, film.encoding, ocio=film.ocio, display=film.display, view=film.view)
         return self._frame(request, shown, start)
 
@@ -156,9 +173,46 @@ class Judge(RenderWorker):
             "low": low,
             "high": high,
             "text": "difference from the reference, linear light, on a logarithmic scale",
-            "colours": ["#" + "".join(f"{int(code):02x}" for code in colour) for colour in RAMP],
+            "colours": hexadecimal([*RAMP]),
         }
         return self._frame(request, Image(colours, "srgb"), start, scale)
+
+    def _trace(self, request: Trace) -> Answer:
+        trace = self._seen(request.view).trace(request.x, request.y)
+        steps = step_tables(trace.steps)
+        return Traced(
+            id=request.id,
+            x=request.x,
+            y=request.y,
+            object=None if trace.number < 0 else trace.number,
+            steps=steps,
+            left_out=len(trace.steps) - len(steps),
+            revision=self._number,
+        )
+
+    def _variable(self, request: ShowVariable) -> Answer:
+        start = perf_counter()
+        asked = request.view.get("variable")
+        if not asked:
+            raise SceneError("the view names no variable: probe a pixel and choose one of its variables")
+        pixels = self._seen(request.view)
+        variable = Variable(asked["place"], asked["name"], asked.get("number", 0))
+        values, present = pixels.values(asked["object"], variable)
+        colours, scale = variable_picture(values, variable.name, present)
+        return self._frame(request, Image(colours, "srgb"), start, scale)
+
+    def _digits(self, request: MeasureDigits) -> Answer:
+        lines = line_tables(self._seen(request.view).digits(request.object))
+        return LostDigits(id=request.id, object=request.object, lines=lines, revision=self._number)
+
+    def _seen(self, view: View) -> Pixels:
+        """Returns the surfaces of a view with their programs, from memory if it is the last one. Errors: SceneError."""
+        scene, shading = self._scene(view)
+        assert self._views is not None
+        self._views.revision.draw_with(self.renderer)
+        if self._pixels is None or self._pixels[0] is not scene or self._pixels[1] != shading:
+            self._pixels = scene, shading, Pixels(scene, self._views.revision.shaders, shading)
+        return self._pixels[2]
 
     def _frame(self, request: Request, image: Image, start: float, scale: dict[str, Any] | None = None) -> Frame:
         height, width, _ = image.shape
@@ -198,19 +252,22 @@ class Judge(RenderWorker):
         assert self._views is not None
         self._views.revision.draw_with(self.renderer)
         judged = judgeable(scene)
-        # The reference comes first: a model without one is refused before anything is drawn.
-        expected = find_candidates(judged, shading=shading, driver=measure_freedom(self.renderer.context))
+        # The reference comes first: a model that has none is refused before anything is drawn.
+        driver, shaders = measure_freedom(self.renderer.context), self._views.revision.shaders
+        expected = find_candidates(judged, shading=shading, driver=driver, shaders=shaders)
         picture = self.renderer.render(judged, dtype="float32", shading=shading).pixels.copy()
         return Trial(judged, expected, verdict_of(picture, expected, explain=False), left_out(scene))
 
 
 def _sentence(trial: Trial) -> str:
     """Returns a verdict as one sentence."""
-    verdict = trial.verdict
+    verdict, against, reference = trial.verdict, "", "the float64 reference"
+    if trial.verdict.derived:
+        against, reference = " against its own text", "its GLSL, run in float64"
     if verdict.verdict == "verified":
-        text = f"verified: all pixels agree with the float64 reference, {verdict.ambiguous:.1%} of them are ambiguous"
+        text = f"verified{against}: all pixels agree with {reference}, {verdict.ambiguous:.1%} of them are ambiguous"
     else:
-        text = f"{verdict.verdict}: {'; '.join(verdict.reasons)}"
+        text = f"{verdict.verdict}{against}: {'; '.join(verdict.reasons)}"
     return f"{text}; not judged: {', '.join(trial.left_out)}" if trial.left_out else text
 
 

@@ -127,6 +127,53 @@ class Heat(Request):
 
 
 @dataclass(frozen=True, kw_only=True)
+class ShowVariable(Request):
+    """Asks the judge for the values of a variable as a picture. The answer is `Frame`, with `scale`, or `Failed`.
+
+    view: the view, whose key "variable" names the object and the variable.
+    """
+
+    view: View
+
+
+@dataclass(frozen=True, kw_only=True)
+class Trace(Request):
+    """Asks the judge for the value of every variable at a pixel. The answer is `Traced` or `Failed`.
+
+    view: the view.
+    x, y: the pixel, from the top left [pixels].
+    """
+
+    view: View
+    x: int
+    y: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class MeasureDigits(Request):
+    """Asks the judge for the lines of an object's program that lose digits. The answer is `LostDigits` or `Failed`.
+
+    view: the view.
+    object: the index of the object in the scene.
+    """
+
+    view: View
+    object: int
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReadSource(Request):
+    """Asks the drawer for the files of an object's program. The answer is `Source` or `Failed`.
+
+    view: the view.
+    object: the index of the object in the scene.
+    """
+
+    view: View
+    object: int
+
+
+@dataclass(frozen=True, kw_only=True)
 class Answer:
     """The base class of answers.
 
@@ -242,7 +289,8 @@ class Picked(Answer):
 class Judged(Answer):
     """The verdict about a view.
 
-    verdict: "verified", "failed", "inconclusive", or "none" where a model has no reference.
+    verdict: "verified", "failed", "inconclusive", or "none" where a model has no reference and its own GLSL cannot be run.
+    derived: whether the picture was compared with its own GLSL, run in float64, because a model has no reference.
     text: the verdict in one sentence.
     unexplained: the number of pixels that no rule of the verifier explains.
     ambiguous: the number of pixels that the float64 reference does not determine, such as those on edges.
@@ -253,6 +301,7 @@ class Judged(Answer):
 
     verdict: Literal["verified", "failed", "inconclusive", "none"]
     text: str
+    derived: bool = False
     unexplained: int = 0
     ambiguous: int = 0
     pixels: list[tuple[int, int]] = field(default_factory=list)
@@ -285,4 +334,58 @@ class Probed(Answer):
     object: str | None = None
     triangle: int | None = None
     text: str = ""
+    revision: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Traced(Answer):
+    """The value of every variable at a pixel.
+
+    x, y: the pixel [pixels].
+    object: the index of the object in the scene; None for the background.
+    steps: a table for each step, in the order in which they ran: "file", "short" (the file's name with its folder), "line",
+        "text", "name", "number" (how many times the line has given the variable a value before), "type", "float64" and
+        "float32" (texts), "digits" (the decimal digits that float32 has lost) and "picture" (whether the variable can be shown
+        as a picture).
+    left_out: the number of further steps, which are not listed.
+    revision: the number of the revision that was traced.
+    """
+
+    x: int
+    y: int
+    object: int | None = None
+    steps: list[Table] = field(default_factory=list)
+    left_out: int = 0
+    revision: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class LostDigits(Answer):
+    """The lines of an object's program that lose more than three digits.
+
+    object: the index of the object in the scene.
+    lines: a table for each line: "file", "line", "text", "digits" and "ill_posed" (whether rounding the inputs alone does as
+        much).
+    revision: the number of the revision that was measured.
+    """
+
+    object: int
+    lines: list[Table] = field(default_factory=list)
+    revision: int = 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class Source(Answer):
+    """The files of an object's program.
+
+    object: the index of the object in the scene.
+    name: the object's name.
+    files: a table for each file: "file" (its path, or <PLACE> for generated text), "name" (its name with its folder)
+        and "lines" (its text, line by line).
+    revision: the number of the revision that holds them.
+    """
+
+    object: int
+    name: str
+    files: list[Table] = field(default_factory=list)
     revision: int = 0

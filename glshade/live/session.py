@@ -17,7 +17,24 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from glshade.live.child import Child, ChildLost
-from glshade.live.messages import Answer, Draw, Failed, Heat, Load, Loaded, Pick, Probe, Reference, Request, Restore, Verify
+from glshade.live.messages import (
+    Answer,
+    Draw,
+    Failed,
+    Heat,
+    Load,
+    Loaded,
+    MeasureDigits,
+    Pick,
+    Probe,
+    ReadSource,
+    Reference,
+    Request,
+    Restore,
+    ShowVariable,
+    Trace,
+    Verify,
+)
 from glshade.live.supervisor import Supervisor, failed
 from glshade.live.watcher import Watcher
 from glshade.live.wire import View
@@ -154,6 +171,8 @@ class Session:
             return await self._ask_judge(Reference(view=view.table()), page)
         if view.source == "heat":
             return await self._ask_judge(Heat(view=view.table()), page)
+        if view.source == "variable":
+            return await self._ask_judge(ShowVariable(view=view.table()), page)
         return await self._supervisor.ask(Draw(view=view.table(), still=still))
 
     async def still_picture(self, view: View) -> Answer:
@@ -167,6 +186,20 @@ class Session:
     async def probe(self, view: View, x: int, y: int, page: Page) -> Answer | None:
         """Returns the values of a pixel of a view, or the reason why there are none; None where the wish was cancelled."""
         return await self._ask_judge(Probe(view=view.table(), x=x, y=y), page)
+
+    async def trace(self, view: View, x: int, y: int, page: Page) -> Answer | None:
+        """Returns the variables at a pixel of a view, or the reason why there are none; None where the wish was cancelled."""
+        return await self._ask_judge(Trace(view=view.table(), x=x, y=y), page)
+
+    async def source(self, view: View, number: int) -> Answer:
+        """Returns the files of an object's program, or the reason why there are none. number: index of the object."""
+        return await self._supervisor.ask(ReadSource(view=view.table(), object=number))
+
+    async def digits(self, view: View, number: int, page: Page) -> Answer | None:
+        """Returns the lines of an object's program that lose digits, or the reason why they are not known; None where the wish
+        was cancelled. number: index of the object
+        """
+        return await self._ask_judge(MeasureDigits(view=view.table(), object=number), page)
 
     async def verify(self, view: View, page: Page) -> Answer | None:
         """Returns the verdict about a view, or the reason why there is none; None where the wish was cancelled."""

@@ -14,7 +14,7 @@ from dataclasses import replace
 from typing import Literal
 
 from glshade.live.child import LIMIT, Child, ChildLost
-from glshade.live.messages import Answer, Draw, Failed, Load, Loaded, Pick, Restore
+from glshade.live.messages import Answer, Draw, Failed, Load, Loaded, Pick, ReadSource, Restore
 from glshade.problem import Problem
 
 # The deaths of the drawer after which a revision is dropped. A single one may be an accident, such as a lack of memory.
@@ -67,7 +67,7 @@ class Supervisor:
         # A page that goes away cancels its wishes. The drawer works on, so the next request has to wait for it.
         return await asyncio.shield(self._load(request))
 
-    async def ask(self, request: Draw | Pick) -> Answer:
+    async def ask(self, request: Draw | Pick | ReadSource) -> Answer:
         """Returns the answer to the request. If the drawer dies, another one is asked; `Failed` if that dies, too."""
         return await asyncio.shield(self._ask(request))
 
@@ -90,7 +90,7 @@ class Supervisor:
                 self._keep(request, answer)
             return answer
 
-    async def _ask(self, request: Draw | Pick) -> Answer:
+    async def _ask(self, request: Draw | Pick | ReadSource) -> Answer:
         async with self._turn:
             for _ in range(MOST_DEATHS):
                 since = time.monotonic()

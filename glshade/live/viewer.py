@@ -12,7 +12,7 @@ from dataclasses import asdict
 from typing import Any, Generic, Protocol, TypeVar
 
 from glshade.live import wire
-from glshade.live.messages import Answer, Failed, Frame, Judged, Picked, Probed
+from glshade.live.messages import Answer, Failed, Frame, Judged, LostDigits, Picked, Probed, Source, Traced
 from glshade.live.session import Session
 
 # The time in which a page must take a message, before its connection is closed [s].
@@ -109,6 +109,8 @@ class Viewer:
         self._picks: Newest[wire.PixelMessage] = Newest()
         self._probes: Newest[wire.PixelMessage] = Newest()
         self._judgements: Newest[wire.View] = Newest()
+        self._sources: Newest[wire.ObjectMessage] = Newest()
+        self._measurements: Newest[wire.ObjectMessage] = Newest()
         self._writes: Newest[wire.WriteMessage] = Newest()
 
     def tell(self, text: str) -> None:
@@ -133,6 +135,8 @@ class Viewer:
             self._serve(self._picks, self._pick),
             self._serve(self._probes, self._probe),
             self._serve(self._judgements, self._judge),
+            self._serve(self._sources, self._source),
+            self._serve(self._measurements, self._measure),
             self._serve(self._writes, self._write),
         ]
         tasks = [asyncio.ensure_future(work) for work in works]
@@ -179,6 +183,8 @@ class Viewer:
                     pane.shown(message.number)
         elif isinstance(message, wire.PixelMessage):
             (self._picks if message.type == "pick" else self._probes).put(message)
+        elif isinstance(message, wire.ObjectMessage):
+            (self._sources if message.type == "source" else self._measurements).put(message)
         elif isinstance(message, wire.WriteMessage):
             self._writes.put(message)
         elif message.type == "judge":
@@ -198,7 +204,7 @@ class Viewer:
             await pane.due()
             message, view = pane.wanted, pane.view
             # The judge takes seconds for a picture, so it draws only views that stand still.
-            if message is None or view is None or (message.moving and view.source in ("reference", "heat")):
+            if message is None or view is None or (message.moving and view.is_slow):
                 continue
             answer = await self._session.picture(view, not message.moving, self)
             if answer is None:
@@ -226,6 +232,29 @@ class Viewer:
         if view is not None:
             answer = await self._session.probe(view, message.x, message.y, self)
             await self._answer("probed", answer, Probed, pane=message.pane)
+            if not isinstance(answer, Probed):
+                return
+            # The variables come later, because the program has to be compiled and run.
+            traced = await self._session.trace(view, message.x, message.y, self)
+            table = _table(traced) if isinstance(traced, Traced) else {"text": text_of(traced) if traced else ""}
+            await self.send("traced", **{**table, "pane": message.pane, "x": message.x, "y": message.y})
+
+    async def _source(self, message: wire.ObjectMessage) -> None:
+        view = self._panes[0].view
+        if view is not None:
+            answer = await self._session.source(view, message.object)
+            table = _table(answer) if isinstance(answer, Source) else {"files": [], "text": text_of(answer)}
+            await self.send("source", **{**table, "object": message.object})
+
+    async def _measure(self, message: wire.ObjectMessage) -> None:
+        view = self._panes[0].view
+        if view is None:
+            return
+        answer = await self._session.digits(view, message.object, self)
+        # A measurement that an edit or another view has cancelled is asked for again by the page.
+        if answer is not None:
+            table = _table(answer) if isinstance(answer, LostDigits) else {"lines": [], "text": text_of(answer)}
+            await self.send("digits", **{**table, "object": message.object})
 
     async def _judge(self, view: wire.View) -> None:
         await self.send("judged", state="judging", text="", unexplained=0, pixels=[], revision=self._session.shown)

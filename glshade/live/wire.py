@@ -20,6 +20,10 @@ MOST_PIXELS = 1 << 24
 LONGEST_SIDE = 16384
 # The pictures that a page shows side by side.
 MOST_PANES = 2
+# The largest index of an object, and the largest number of a step of a trace, that a page may name.
+LARGEST_INDEX = 1 << 20
+# The kinds of pictures.
+SOURCES = r"^(picture|last_good|previous|reference|heat|variable|file:.+)$"
 # Version of the binary messages.
 VERSION = 1
 
@@ -63,6 +67,21 @@ class ViewCamera(_Message):
     height: float | None = None
 
 
+class Variable(_Message):
+    """A variable of an object's program.
+
+    object: index of the object in the scene
+    place: the file and the line in it, as `file:line`
+    name: name of the variable, as the trace of a pixel gives it
+    number: how many times the line has given it a value before
+    """
+
+    object: int = Field(ge=0, le=LARGEST_INDEX)
+    place: Text
+    name: Text
+    number: int = Field(0, ge=0, le=LARGEST_INDEX)
+
+
 class View(_Message):
     """Everything that a pane shows.
 
@@ -72,7 +91,8 @@ class View(_Message):
     shading: "flat", "gouraud" or "phong" for the whole picture; None leaves it to the scene
     layer: name of a layer; None is the picture
     paint: "nan" paints pixels whose value is NaN or infinite
-    source: kind of the picture: "picture", "last_good", "previous", "reference", "heat" or "file:PATH"
+    source: kind of the picture: "picture", "last_good", "previous", "reference", "heat", "variable" or "file:PATH"
+    variable: the variable whose values are shown, if the source is "variable"
     """
 
     camera: ViewCamera | None = None
@@ -81,7 +101,13 @@ class View(_Message):
     shading: Literal["flat", "gouraud", "phong"] | None = None
     layer: Text | None = None
     paint: Literal["nan"] | None = None
-    source: Annotated[str, Field(pattern=r"^(picture|last_good|previous|reference|heat|file:.+)$", max_length=4096)] = "picture"
+    source: Annotated[str, Field(pattern=SOURCES, max_length=4096)] = "picture"
+    variable: Variable | None = None
+
+    @property
+    def is_slow(self) -> bool:
+        """Whether the judge computes the picture, which takes seconds."""
+        return self.source in ("reference", "heat", "variable")
 
     def table(self) -> dict[str, Any]:
         """Returns the view as the drawer and the judge take it: a camera holds only the keys that were given."""
@@ -128,6 +154,16 @@ class PixelMessage(_Message):
     y: int = Field(ge=0, lt=LONGEST_SIDE)
 
 
+class ObjectMessage(_Message):
+    """Asks for the files of an object's program ("source"), or for the lines of it that lose digits ("digits").
+
+    object: index of the object in the scene
+    """
+
+    type: Literal["source", "digits"]
+    object: int = Field(ge=0, le=LARGEST_INDEX)
+
+
 class PlainMessage(_Message):
     """Asks for a verdict on the view of the first pane ("judge"), or for the state and all pictures again ("reset")."""
 
@@ -144,7 +180,7 @@ class WriteMessage(_Message):
     values: dict[Text, JsonValue] = Field(min_length=1, max_length=1000)
 
 
-PageMessage: TypeAlias = ViewMessage | ShownMessage | PixelMessage | PlainMessage | WriteMessage
+PageMessage: TypeAlias = ViewMessage | ShownMessage | PixelMessage | ObjectMessage | PlainMessage | WriteMessage
 _MESSAGES: TypeAdapter[PageMessage] = TypeAdapter(Annotated[PageMessage, Field(discriminator="type")])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from types import SimpleNamespace
@@ -66,6 +67,8 @@ class Draw:
     turn: cosine and sine (2,) of the angle by which tangents are turned.
     alpha: the material's alpha, which the alpha of the base texture and of vertex colours multiplies.
     alpha_cutoff: least alpha that is drawn, if the alpha mode is "mask".
+    text: optional; takes a Surface and returns the light (N, 3) of its points, in place of the Python functions of the model
+        and the lights.
     """
 
     instance: Instance
@@ -86,6 +89,7 @@ class Draw:
     turn: Array
     alpha: float
     alpha_cutoff: float
+    text: Callable[[Any], NDArray[Any]] | None = None
 
     @property
     def model(self) -> type[Brdf]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
@@ -45,6 +46,20 @@ class Surface:
     colour: Array | None
     footprint: tuple[Array, Array] | None = None
     level: Any = 0.0
+
+
+def joined(surfaces: Sequence[Surface]) -> Surface:
+    """Returns the points of several surfaces, which have the same attributes, as one surface."""
+
+    def join(values: list[Any]) -> Any:
+        if isinstance(values[0], tuple):
+            return tuple(join(list(parts)) for parts in zip(*values, strict=True))
+        return None if values[0] is None else np.concatenate(values)
+
+    counts = [len(surface.position) for surface in surfaces]
+    levels = [np.broadcast_to(surface.level, count) for surface, count in zip(surfaces, counts, strict=True)]
+    named = {name: join([getattr(surface, name) for surface in surfaces]) for name in vars(surfaces[0]) if name != "level"}
+    return Surface(**named, level=np.concatenate(levels))
 
 
 def at_vertices(draw: Draw, which: NDArray[np.intp], dtype: Any, centroids: bool = False) -> Surface:
@@ -162,6 +177,8 @@ def evaluate_surface(draw: Draw, surface: Surface, material: SimpleNamespace | N
 
     material: optional, the result of `material_of` for the same points, where it is known already.
     """
+    if draw.text is not None:
+        return draw.text(surface)
     dtype = surface.position.dtype
     if draw.instance.shows != "light":
         return _property(draw, surface)

@@ -7,7 +7,7 @@ its own arithmetic. The rule is the same for every model.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, replace
 from itertools import product
 from typing import Any
@@ -21,6 +21,7 @@ from glshade.radiance.surface import (
     alpha_of,
     at_vertices,
     evaluate_surface,
+    joined,
     light_at,
     material_of,
     toward_viewer,
@@ -354,12 +355,12 @@ def _over_patches(
         _, first, group = np.unique(2 * at[tiny] + (surface.side[tiny] > 0), return_index=True, return_inverse=True)
         part = tiny[first]
         points = on_triangles(draw, fragments.take(part), _take(surface, part))
-        found = light_range(draw, points, TRIANGLE_LINES, _float32)
+        found = light_range(draw, points, TRIANGLE_LINES, narrowed)
         found = Range(*(getattr(found, f.name)[group.reshape(-1)] for f in fields(Range)))
         add(tiny, _ranged(draw, _take(surface, tiny), _share(errors, tiny), found))
     if len(wide):
         points = on_grid(draw, fragments.take(wide), _take(surface, wide), planes.size, extent, 3, inside=False)
-        found = light_range(draw, points, GRID_LINES, _float32)
+        found = light_range(draw, points, GRID_LINES, narrowed)
         add(wide, _ranged(draw, _take(surface, wide), _share(errors, wide), found))
     if len(other):
         add(other, _searched(draw, fragments.take(other), _take(surface, other), _taken(errors, other), planes.size, extent))
@@ -464,7 +465,7 @@ def _spread(
     material = material_of(draw, surface)
     value = evaluate(draw, surface, material)
     below, above = np.zeros_like(value), np.zeros_like(value)
-    rounding = np.abs(evaluate(draw, _float32(surface)) - value)
+    rounding = np.abs(evaluate(draw, narrowed(surface)) - value)
 
     def widen(values: list[Array], margin: Array | float = 0.0) -> None:
         """Widens below and above by the deviations of the values, each of which is uncertain by the margin."""
@@ -481,7 +482,7 @@ def _spread(
             widen([low, high])
     which = np.flatnonzero(curved)
     if patch is not None and len(which):
-        light = np.stack([evaluate(draw, place) for place in patch(which)])
+        light = np.stack(_evaluated(draw, evaluate, patch(which)))
         grid = light.reshape(GRID, GRID, *light.shape[1:])
         margin = np.maximum(_between(list(grid)).max(axis=0), _between(list(grid.swapaxes(0, 1))).max(axis=0))
         below[which] += np.maximum(value[which] - light.min(axis=0) + margin, 0)
@@ -489,13 +490,14 @@ def _spread(
     for axis, error in enumerate([] if errors.uv is None else errors.uv.T):
         # Filtered textures have a kink at the middle of every texel, so the ends of the error are not enough.
         shifts = _spaced(-error, error, SHIFTS)
-        values = [evaluate(draw, _moved(surface, "uv", axis, shift)) for shift in shifts]
+        values = _evaluated(draw, evaluate, (_moved(surface, "uv", axis, shift) for shift in shifts))
         widen(values, _between(values))
     if errors.colour is not None and surface.colour is not None:
         widen([evaluate(draw, replace(surface, colour=surface.colour + sign * errors.colour)) for sign in (-1, 1)])
     level = np.zeros_like(value)
     if errors.level is not None:
-        values = [evaluate(draw, replace(surface, level=offset)) for offset in _spaced(*errors.level, LEVELS)]
+        offsets = _spaced(*errors.level, LEVELS)
+        values = _evaluated(draw, evaluate, (replace(surface, level=offset) for offset in offsets))
         margin = _between(values)
         widen(values, margin)
         level = np.maximum.reduce([np.abs(other - value) for other in values]) + margin
@@ -542,14 +544,13 @@ def over_box(
     # All corners of the box of normals are tried, so that a lobe is evaluated on both sides of its horizon. Positions and
     # tangents seldom matter as much, and a linear function changes by the sum of its changes along the axes.
     directions = diagonals if name == "normal" else [error * (np.arange(3) == axis) for axis in range(3)]
-    ends = []
-    for number, direction in enumerate(directions):
-        opposite = [moved(surface, sign * direction) for sign in (-1.0, 1.0)]
-        ends.append(np.stack([evaluate(draw, end, material) for end in opposite]))
+    opposite = (moved(surface, sign * direction) for direction in directions for sign in (-1.0, 1.0))
+    light = _evaluated(draw, evaluate, opposite, material)
+    ends = [np.stack(light[first : first + 2]) for first in range(0, len(light), 2)]
+    if name == "normal":
         # Two opposite corners are enough to see whether the rounding error is larger beside the exact normal.
-        if name == "normal" and number == 2:
-            single = np.stack([evaluate(draw, _float32(end)) for end in opposite])
-            rounding = np.abs(single - ends[-1]).max(axis=0)
+        corners = (narrowed(moved(surface, sign * directions[2])) for sign in (-1.0, 1.0))
+        rounding = np.abs(np.stack(_evaluated(draw, evaluate, corners)) - ends[2]).max(axis=0)
     if name == "normal":
         low, high = np.minimum.reduce(ends).min(axis=0), np.maximum.reduce(ends).max(axis=0)
     else:
@@ -567,7 +568,7 @@ def over_box(
     if search and len(bent):
         points = _take(surface, bent)
         least, largest = _search(
-            lambda offset: evaluate(draw, moved(points, offset)),
+            lambda offsets: _evaluated(draw, evaluate, (moved(points, offset) for offset in offsets)),
             error[bent],
             [diagonal[bent] for diagonal in diagonals],
             [toward[bent] for toward in towards],
@@ -576,10 +577,24 @@ def over_box(
     return low, high, rounding, curved
 
 
-def _search(light: Callable[[Array], Array], half: Array, diagonals: list[Array], towards: list[Array]) -> tuple[Array, Array]:
+def _evaluated(draw: Draw, evaluate: Callable[..., Array], surfaces: Iterable[Surface], material: Any = None) -> list[Array]:
+    """Returns the light (N, 3) of each of several surfaces with N points.
+
+    A text takes about as long for one point as for a thousand, so that it is run for all surfaces at once.
+    material: optional, the material of all surfaces.
+    """
+    if draw.text is None:
+        return [evaluate(draw, surface, material) for surface in surfaces]
+    several = list(surfaces)
+    return list(evaluate(draw, joined(several)).reshape(len(several), -1, 3))
+
+
+def _search(
+    light: Callable[[list[Array]], list[Array]], half: Array, diagonals: list[Array], towards: list[Array]
+) -> tuple[Array, Array]:
     """Returns the least and the largest light, each (N, 3), that is found on lines through N boxes.
 
-    light: takes offsets (N, 3) from the middles of the boxes and returns the light (N, 3) there.
+    light: takes offsets (N, 3) from the middles of the boxes, several of them, and returns the light (N, 3) at each.
     half: half the sides of the boxes (N, 3).
     diagonals: the offsets (N, 3) of the boxes' corners, one for each diagonal.
     towards: the offsets (N, 3) of the lights that may make a peak.
@@ -589,7 +604,7 @@ def _search(light: Callable[[Array], Array], half: Array, diagonals: list[Array]
     def sample(centre: Array, direction: Array) -> tuple[Array, Array]:
         """Samples the line from centre - direction to centre + direction: (offsets, light), (LEVELS, N, 3) each."""
         offsets = _spaced(centre - direction, centre + direction, LEVELS)
-        along = [light(offset) for offset in offsets]
+        along = light(offsets)
         margin = _between(along)
         lows.append(np.minimum.reduce(along) - margin)
         highs.append(np.maximum.reduce(along) + margin)
@@ -715,7 +730,7 @@ def _between(samples: list[Array]) -> Array:
     return bend / 2
 
 
-def _float32(surface: Surface) -> Surface:
+def narrowed(surface: Surface) -> Surface:
     """Returns the surface with all attributes rounded to float32."""
 
     def narrow(value: Any) -> Any:

@@ -1,7 +1,7 @@
 """GLSL models: reflectance models that consist of a GLSL file alone. Their parameters are the members of its struct.
 
-Such a model is drawn like any other, but it has no reference: no code computes it in float64, so its pictures cannot be
-verified. docs/extending.md explains the comments that declare ranges and defaults.
+Such a model is drawn like any other, but it has no reference: its pictures are verified against its GLSL, run in float64
+(glshade/spirv). docs/extending.md explains the comments that declare ranges and defaults.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class GlslModel(Brdf):
         twin = cls.path.with_suffix(".py").name
         return NoReference(
             f'{cls.path}: the model "{cls.path.stem}" has no reference, because no {twin} computes it in float64; '
-            "its pictures cannot be verified"
+            "glshade verify compares its pictures with the GLSL itself"
         )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.arrays import group_starts
+from glshade.glsl.shaders import Shaders
 from glshade.reference.bounds import TINY, Bounds, fragment_bounds
 from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.inputs import Inputs, prepare
@@ -21,6 +22,7 @@ from glshade.scene.film import Film
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
 from glshade.verification.judgement import Expected, PixelClass
+from glshade.verification.own_text import with_text
 from glshade.verification.pieces import Pieces, Visible, visible
 
 Array = NDArray[Any]
@@ -74,16 +76,31 @@ class Candidates:
             return "background", -1
         return self.inputs.draws[number].instance.name, int(self.triangle[candidate])
 
+    @property
+    def derived(self) -> bool:
+        """Whether the GLSL of some object was run in place of its model's Python function."""
+        return any(draw.text is not None for draw in self.inputs.draws)
 
-def find_candidates(scene: Scene, *, shading: Rate | None = None, driver: Freedom = LLVMPIPE) -> Candidates:
+
+def find_candidates(
+    scene: Scene,
+    *,
+    shading: Rate | None = None,
+    driver: Freedom = LLVMPIPE,
+    derived: bool = False,
+    shaders: Shaders | None = None,
+) -> Candidates:
     """Returns the values that a picture of the scene may have, with the samples that its film asks for.
 
     shading: the shading rate for the whole scene; by default, each object has its own.
     driver: the freedom that the specification leaves to the driver.
-    Errors: SceneError; NoReference for a reflectance model that has only a GLSL file.
+    derived: True to run the GLSL of all objects in float64 in place of the models' Python functions. Without it, the GLSL is
+        run for models that have no Python function.
+    shaders: optional; the shader files whose GLSL is run. Default: those that ship with glshade.
+    Errors: SceneError, ShaderError; NoReference for a model that has only its GLSL, where no compiler can read that.
     """
     film = scene.film
-    inputs = prepare(scene, shading)
+    inputs = with_text(scene, prepare(scene, shading), shading, derived, shaders)
     offsets = _offsets(film, driver)
     if len(offsets) == 1:
         shown = _shown(inputs, _freedom(film, driver))
@@ -221,8 +238,30 @@ def _shown(inputs: Inputs, driver: Freedom) -> _Shown:
         shown = _merged(shown, inputs.background)
     wide = np.zeros(len(classes), dtype=np.bool_)
     wide[shown.pixel[(shown.high - shown.low > widest).any(axis=1)]] = True
+    if any(draw.text is not None for draw in inputs.draws):
+        shown = _undetermined(inputs, shown, wide)
     shown.classes[wide & (shown.classes != PixelClass.EDGE)] = PixelClass.WIDE
     return shown
+
+
+def _undetermined(inputs: Inputs, shown: _Shown, wide: Flags) -> _Shown:
+    """Returns the candidates with intervals without ends where float32 does not determine the value of a text.
+
+    A few runs with random rounding tell how far a driver may err, except where the text has a pole: there, few results are far
+    off, but very far. So the pixels beside a wide one are not determined either.
+    wide: (P,), the wide pixels; those beside them are added where a text was run.
+    """
+    from scipy.ndimage import binary_dilation
+
+    width, height = inputs.size
+    of_text = np.array([draw.text is not None for draw in inputs.draws] + [False])
+    run = np.zeros(len(wide), dtype=np.bool_)
+    # The last entry stands for the background, whose number is -1.
+    run[shown.pixel[of_text[shown.draw]]] = True
+    around = binary_dilation((wide & run).reshape(height, width), np.ones((3, 3))).reshape(-1) & run
+    wide |= around
+    free = around[shown.pixel, None]
+    return replace(shown, low=np.where(free, -np.inf, shown.low), high=np.where(free, np.inf, shown.high))
 
 
 def _doubtful(seen: Visible) -> Flags:

@@ -148,7 +148,7 @@ def _page(report: Report, images: Mapping[str, str], least: float, greatest: flo
     return template.render(
         Path(__file__).parent / "report.html.j2",
         report=report,
-        state={"verified": "good", "failed": "bad"}.get(report.verdict, "warn"),
+        state={"verified": "good", "failed": "bad"}.get(report.verdict.partition(" ")[0], "warn"),
         images=images,
         captions=captions,
         size=(width * scale, height * scale),

@@ -56,6 +56,7 @@ def try_mutations(
     renderer: Renderer,
     shading: Rate | None = None,
     expected: Candidates | None = None,
+    derived: bool = False,
 ) -> list[Trial]:
     """Draws the scene with one mutation at a time and one sample a pixel, and has the verifier judge each picture.
 
@@ -64,10 +65,13 @@ def try_mutations(
     renderer: draws the pictures. Its `rewrite` is None afterwards.
     shading: the rate for the whole scene; the default is each object's own.
     expected: the candidates of the scene with one sample a pixel, if they are known already.
+    derived: True to compare with the GLSL before it is mutated, run in float64, and not with the models' Python functions.
     Errors: those of `Renderer.render`.
     """
     scene = one_sample(scene)
-    expected = expected or find_candidates(scene, shading=shading, driver=measure_freedom(renderer.context))
+    if expected is None:
+        driver, shaders = measure_freedom(renderer.context), renderer.current_shaders()
+        expected = find_candidates(scene, shading=shading, driver=driver, derived=derived, shaders=shaders)
 
     def draw(rewrite: Rewrite | None) -> Array:
         renderer.rewrite = rewrite

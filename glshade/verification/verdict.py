@@ -77,6 +77,8 @@ class Verdict:
     seconds: name of a step -> the time that it took [s].
     left_out: the settings of the scene that were not judged, each as "name = value"; the picture was drawn without them.
     encoding: the encoding of an 8-bit picture, "srgb" or "linear"; empty for a linear float picture.
+    derived: whether the picture was compared with its own GLSL, run in float64, and not with the models' Python functions.
+    notes: what else was found, one sentence for each.
     """
 
     verdict: Literal["verified", "failed", "inconclusive"]
@@ -90,6 +92,13 @@ class Verdict:
     seconds: dict[str, float]
     left_out: tuple[str, ...] = ()
     encoding: str = ""
+    derived: bool = False
+    notes: tuple[str, ...] = ()
+
+    @property
+    def words(self) -> str:
+        """The verdict in words: a picture that agrees with its own GLSL alone is never called simply verified."""
+        return f"{self.verdict} against its own text" if self.derived else self.verdict
 
     @property
     def unexplained(self) -> int:
@@ -110,10 +119,11 @@ class Verdict:
         c = self.comparison
         counts = ", ".join(f"{number} {kind.name.lower()}" for kind, number in c.counts.items() if number)
         lines = [
-            f"{self.verdict}: {c.unexplained} pixels unexplained, {self.ambiguous:.2%} ambiguous, "
+            f"{self.words}: {c.unexplained} pixels unexplained, {self.ambiguous:.2%} ambiguous, "
             f"worst interior error {c.worst:.1e} (RMSE {c.rmse:.1e}, p99.9 {c.p999:.1e}; at most {share(self.used)} "
             "of a pixel's tolerance)",
             *self.reasons,
+            *self.notes,
             counts,
         ]
         if self.left_out:
@@ -149,6 +159,7 @@ class Verdict:
             "largest tolerance": f"{c.tolerance:.2e}",
             "most used": f"{share(self.used)} of a pixel's own tolerance",
             "not judged": ", ".join(self.left_out) or "-",
+            "compared with": "its own GLSL, run in float64" if self.derived else "the models' Python functions",
             "time": ", ".join(f"{name} {seconds:.2f} s" for name, seconds in self.seconds.items()),
         }
         heads = ("x", "y", "object", "triangle", "class", "value", "lowest", "highest", "error", "used", "arises in")
@@ -169,13 +180,16 @@ class Verdict:
             for p in self.worst_pixels
         ]
         picture, reference = (Image(p, self.encoding or "linear").linear().pixels for p in (self.picture, self.reference))
-        return write(folder, Report(title, self.verdict, self.reasons, picture, reference, c, self.classes, facts, heads, rows))
+        return write(
+            folder,
+            Report(title, self.words, (*self.reasons, *self.notes), picture, reference, c, self.classes, facts, heads, rows),
+        )
 
     def as_dict(self) -> dict[str, Any]:
         """Returns the verdict in a form that JSON can hold, without the pictures."""
         c = self.comparison
         return {
-            "verdict": self.verdict,
+            "verdict": self.words,
             "reasons": list(self.reasons),
             "unexplained": c.unexplained,
             "non_finite": c.non_finite,
@@ -186,6 +200,8 @@ class Verdict:
             "driver": self.driver,
             "seconds": self.seconds,
             "left_out": list(self.left_out),
+            "derived": self.derived,
+            "notes": list(self.notes),
         }
 
 
@@ -246,6 +262,7 @@ def verdict_of(
         made_by or "picture given",
         {},
         encoding=expected.encoding,
+        derived=expected.derived,
     )
 
 

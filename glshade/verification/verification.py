@@ -9,12 +9,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.glsl.shaders import current
 from glshade.image.image import Image
 from glshade.reference.freedom import UNMEASURED, Freedom
-from glshade.scene.models import Folders, use_models
+from glshade.scene.models import Folders, paths, use_models
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
 from glshade.verification.candidates import find_candidates, judgeable, left_out
+from glshade.verification.own_text import differences
 from glshade.verification.verdict import MAX_AMBIGUOUS, Verdict, verdict_of
 
 Array = NDArray[Any]
@@ -34,6 +36,7 @@ def verify(
     driver: Freedom | None = None,
     shaders: Folders | None = None,
     models: Folders | None = None,
+    derived: bool = False,
 ) -> Verdict:
     """Draws a scene, compares the linear picture with the float64 reference, and returns the verdict.
 
@@ -46,8 +49,10 @@ def verify(
     driver: optional; the errors of the driver's fixed functions. By default they are measured. If only `picture` is given, its
         driver is not known, and may use the whole freedom that the specification leaves it.
     shaders, models: folders of the user's own shaders and models, as for Renderer.
-    Errors: SceneError, ShaderError, ContextError; NoReference for a reflectance model that has only a GLSL file; GlshadeError
-    where `picture` has another size than the scene's.
+    derived: True to compare with the GLSL of all objects, run in float64, in place of the models' Python functions. Without it,
+        only models that have no Python function are verified against their own GLSL.
+    Errors: SceneError, ShaderError, ContextError; MissingLibrary or NoReference where glslangValidator is needed and not
+    installed; GlshadeError where `picture` has another size than the scene's.
     """
     from time import perf_counter
 
@@ -68,11 +73,13 @@ def verify(
 
             driver = measure_freedom(renderer.context)
     drawn = perf_counter()
-    expected = find_candidates(scene, shading=shading, driver=driver or UNMEASURED)
+    files = renderer.current_shaders() if renderer is not None else current(paths(shaders))
+    expected = find_candidates(scene, shading=shading, driver=driver or UNMEASURED, derived=derived, shaders=files)
     judged = perf_counter()
     result = verdict_of(np.asarray(getattr(picture, "pixels", picture)), expected, mask, max_ambiguous, made_by)
+    notes = tuple(differences(scene, expected.inputs, shading, files)) if derived else ()
     result.seconds.update({"draw": drawn - start, "reference": judged - drawn, "judge": perf_counter() - judged})
-    return replace(result, left_out=not_judged)
+    return replace(result, left_out=not_judged, notes=notes)
 
 
 def _drawn(scene: Scene, shading: Rate | None, renderer: Any) -> tuple[Array, str]:

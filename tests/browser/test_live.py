@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -325,6 +326,32 @@ def test_the_badge_says_whether_the_picture_is_right(live: Live, open_page: Open
     page.locator("#verdict .pixels button").first.click()
     page.get_by_role("heading", name="Pixel").wait_for(timeout=60_000)
     page.locator("#probe tr.bad").first.wait_for()
+
+
+@pytest.mark.skipif(shutil.which("glslangValidator") is None, reason="needs glslangValidator (apt install glslang-tools)")
+def test_a_line_that_loses_digits_is_found_and_mended(live: Live, open_page: Open) -> None:
+    page = open_page(live.address)
+    first = revision(page)
+    live.tint.write_text(TINT.replace("return kd;", "vec3 far = kd + 8192.0;\n    return far - 8192.0;"))
+    wait_for_revision(page, first + 1)
+    page.get_by_text("Probe", exact=True).click()
+    box = page.locator("canvas.picture").first.bounding_box()
+    page.mouse.click(box["x"] + box["width"] * POT[0] / SIZE[0], box["y"] + box["height"] * POT[1] / SIZE[1])
+    line = page.get_by_role("button", name="math/tint.glsl:4").first
+    line.wait_for(timeout=60_000)
+    page.locator(".trace").get_by_role("button", name="far").first.click()
+    page.wait_for_selector("canvas[data-pane='1'][data-still=true]", timeout=60_000)
+    assert pixels(page, 1)[POT[1], POT[0], 3] == 255
+    assert pixels(page, 1)[POT[1], SIZE[0] - POT[0], 3] == 0, "the cup has another program"
+
+    page.get_by_role("button", name="math/tint.glsl:3").first.click()
+    page.locator(".listing .losing").wait_for(timeout=60_000)
+    assert re.match(r"\s*3\s+vec3 far = kd \+ 8192.0;\s+loses \d\.\d digits", page.locator(".listing .target").inner_text())
+
+    live.tint.write_text(TINT)
+    page.get_by_text("No line loses more than three digits.").first.wait_for(timeout=60_000)
+    assert page.locator(".listing .losing").count() == 0
+    page.get_by_role("button", name="Verified").wait_for(timeout=60_000)
 
 
 def test_the_reference_and_the_heat_map(live: Live, open_page: Open) -> None:

@@ -230,13 +230,60 @@ def test_the_probe_reads_a_pixel_by_mouse_and_by_keyboard(fake: FakeLive, open_p
     page.get_by_text("Probe", exact=True).click()
     page.locator("canvas.picture").first.click(position={"x": 10, "y": 20})
     page.get_by_role("heading", name="Pixel 10, 20").wait_for()
-    assert "0.212639" in text_of(page, "#probe table")
+    assert "0.212639" in text_of(page, ".readout table")
     page.keyboard.press("Shift+ArrowRight")
     page.keyboard.press("ArrowUp")
     page.keyboard.press("Enter")
     page.get_by_role("heading", name="Pixel 20, 19").wait_for()
     page.keyboard.press("Escape")
     assert page.locator("#probe").is_hidden()
+
+
+def test_the_variables_of_a_pixel_can_be_shown_as_pictures(fake: FakeLive, open_page: Open) -> None:
+    page = open_page(fake.address)
+    page.get_by_text("Probe", exact=True).click()
+    page.locator("canvas.picture").first.click(position={"x": 10, "y": 20})
+    rows = page.locator(".trace tbody tr")
+    rows.last.wait_for()
+    assert rows.nth(1).inner_text().split() == ["<surface>:150", "x149", "(2)", "0.123456789", "0.123500000", "3.8"]
+    assert [rows.nth(index).get_attribute("class") for index in range(3)] == [None, "bad", None]
+    assert rows.nth(2).get_by_role("button", name="m", exact=True).count() == 0
+    view = after(fake, page, lambda: rows.nth(1).get_by_role("button", name="x149 (2)").click())
+    assert view["panes"][1]["source"] == "variable"
+    assert view["panes"][1]["variable"] == {"object": 0, "place": "<surface>:150", "name": "x149", "number": 1}
+    assert text_of(page, "figure:nth-of-type(2) .caption") == "x149, <surface>:150"
+    assert rows.first.is_visible(), "the probe stays"
+    assert after(fake, page, lambda: page.select_option("#view-1", "heat"))["panes"][1]["source"] == "heat"
+
+
+def test_the_source_marks_lines_that_lose_digits(fake: FakeLive, open_page: Open) -> None:
+    page = open_page(fake.address)
+    page.get_by_role("tab", name="Source").click()
+    page.locator(".listing .losing").wait_for()
+    assert " ".join(text_of(page, ".listing [data-line='2']").split()) == "2 float far = NoH + 8192.0; loses 3.7 digits"
+    assert "underline" in page.locator(".losing").evaluate("(e) => getComputedStyle(e).textDecorationLine")
+    assert page.get_by_text("2 lines lose more than three digits.").first.is_visible()
+    page.select_option("#source-file", "<surface>")
+    assert page.locator(".listing .losing").count() == 0, "the line has another text, so another program's line is meant"
+
+    page.get_by_text("Probe", exact=True).click()
+    page.locator("canvas.picture").first.click(position={"x": 10, "y": 20})
+    page.get_by_role("button", name="<surface>:150").first.click()
+    page.locator(".listing .target").wait_for()
+    assert text_of(page, ".listing .target").split() == ["150", "float", "x149;"]
+    page.wait_for_timeout(100)
+    assert page.locator(".listing .target").evaluate("(e) => e.getBoundingClientRect().top") < 900
+
+    fake.received.clear()
+    fake.push(revision=13)
+    assert sent(fake, page, "source") == [{"type": "source", "object": 0}]
+    assert sent(fake, page, "digits") == [{"type": "digits", "object": 0}]
+
+
+def test_a_picture_may_be_verified_against_its_own_text(fake: FakeLive, open_page: Open) -> None:
+    fake.judgement["derived"] = True
+    page = open_page(fake.address)
+    page.get_by_role("button", name="Verified against its own text").wait_for()
 
 
 def test_two_views_side_by_side_and_under_a_swipe(fake: FakeLive, open_page: Open) -> None:

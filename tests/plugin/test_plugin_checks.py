@@ -534,3 +534,56 @@ def test_a_run_without_pictures_writes_nothing(project: Any, root: Path) -> None
     result.assert_outcomes(passed=1)
     assert told(result) == []
     assert {path.name for path in root.iterdir()} - {path.name for path in before} <= {"test_project.py", "__pycache__"}
+
+
+GLSL_TESTS = """#include "math/unit.glsl"
+
+bool test_unit() {
+    return abs(length(unit(vec3(3.0, 4.0, 0.0))) - 1.0) < 1e-6;
+}
+
+bool test_too_bright(vec3 l, vec3 v) {
+    float z = l.z;
+    return z > 2.0;
+}
+"""
+
+
+def test_glsl_tests_are_collected(pytester: pytest.Pytester, project: Any) -> None:
+    (pytester.path / "lobes.test.glsl").write_text(GLSL_TESTS, encoding="utf-8")
+    (pytester.path / "none.glsl").write_text(GLSL_TESTS, encoding="utf-8")
+    result = project("", "-v")
+    result.assert_outcomes(passed=1, failed=1)
+    result.stdout.fnmatch_lines(["*lobes.test.glsl::test_unit PASSED*", "*lobes.test.glsl::test_too_bright FAILED*"])
+    result.stdout.fnmatch_lines(["float64 on the CPU: false at 4096 of 4096 pairs of directions", "8: z = * in float64, *"])
+    assert "Traceback" not in result.stdout.str()
+
+
+def test_glsl_tests_of_a_folder_of_shaders(pytester: pytest.Pytester, project: Any) -> None:
+    (pytester.path / "own" / "math").mkdir(parents=True)
+    (pytester.path / "own" / "math" / "half.glsl").write_text("float half_of(float x) {\n    return 0.5 * x;\n}\n")
+    text = '#include "math/half.glsl"\n\nbool test_half() {\n    return half_of(4.0) == 2.0;\n}\n'
+    (pytester.path / "half.test.glsl").write_text(text, encoding="utf-8")
+    project("", "--glshade-shaders", str(pytester.path / "own")).assert_outcomes(passed=1)
+    result = project("")
+    result.assert_outcomes(failed=1)
+    result.stdout.fnmatch_lines(['*half.test.glsl*no shader file "math/half.glsl"*'])
+
+
+def test_digits(project: Any) -> None:
+    result = project(
+        """
+        def test_steady(render_regression):
+            render_regression.digits("lambert")
+
+        def test_loses(render_regression):
+            render_regression.digits(glshade.BRDFS["beckmann"], limit=1e-9)
+
+        def test_unknown(render_regression):
+            render_regression.digits("lambart")
+        """
+    )
+    result.assert_outcomes(passed=1, failed=2)
+    result.stdout.fnmatch_lines(
+        ["*cos_half.glsl:6: loses * of the result: *", '*no model is named *lambart*did you mean "lambert"*']
+    )

@@ -125,6 +125,40 @@ PROBLEM = {
     "caret": 30,
     "stage": "fragment",
 }
+# The files of the object, and the lines of them that lose digits.
+FILES = [
+    {
+        "file": "/shaders/brdf/blinn_phong.glsl",
+        "name": "brdf/blinn_phong.glsl",
+        "lines": ["float lobe() {", "\tfloat far = NoH + 8192.0;", "}"],
+    },
+    {"file": "<surface>", "name": "<surface>", "lines": [f"float x{number};" for number in range(200)]},
+]
+LOST = [
+    {
+        "file": "/shaders/brdf/blinn_phong.glsl",
+        "line": 2,
+        "text": "float far = NoH + 8192.0;",
+        "digits": 3.7,
+        "ill_posed": False,
+    },
+    {"file": "<surface>", "line": 7, "text": "another text", "digits": 5.0, "ill_posed": True},
+]
+# The variables of a pixel.
+STEP = {
+    "file": "<surface>",
+    "short": "<surface>",
+    "line": 150,
+    "text": "float x149;",
+    "name": "x149",
+    "number": 0,
+    "type": "float",
+}
+STEPS = [
+    {**STEP, "float64": "0.25", "float32": "0.25", "digits": 0.0, "picture": True},
+    {**STEP, "number": 1, "float64": "0.123456789", "float32": "0.123500000", "digits": 3.8, "picture": True},
+    {**STEP, "name": "m", "float64": "(1, 2)", "float32": "(1, 2)", "digits": 0.0, "picture": False},
+]
 COLOURS = ["#000004", "#3b0f70", "#8c2981", "#de4968", "#fe9f6d", "#fcfdbf"]
 
 
@@ -183,8 +217,9 @@ class FakeLive:
         with suppress(ConnectionClosed):
             connection.send(json.dumps(self.state))
             for text in connection:
-                self.received.append(json.loads(text))
-                self._reply(connection, self.received[-1])
+                message = json.loads(text)
+                self.received.append(message)
+                self._reply(connection, message)
         self.connections.remove(connection)
 
     def _reply(self, connection: ServerConnection, message: dict[str, Any]) -> None:
@@ -193,6 +228,11 @@ class FakeLive:
                 connection.send(self._frame(message, pane, view))
         elif answer := self._answer(message):
             connection.send(json.dumps(answer))
+            if message["type"] == "probe":
+                place = {key: answer[key] for key in ("pane", "x", "y")}
+                connection.send(
+                    json.dumps({"type": "traced", "object": 0, "steps": STEPS, "left_out": 0, "revision": 12, **place})
+                )
 
     def _answer(self, message: dict[str, Any]) -> dict[str, Any] | None:
         place = {key: message.get(key) for key in ("pane", "x", "y")}
@@ -222,6 +262,10 @@ class FakeLive:
                 **values,
                 **place,
             }
+        if message["type"] == "source":
+            return {"type": "source", "object": message["object"], "name": "ball", "files": FILES, "revision": 12}
+        if message["type"] == "digits":
+            return {"type": "digits", "object": message["object"], "lines": LOST, "revision": 12}
         if message["type"] == "write":
             return {"type": "written", "ok": True, "text": "Wrote 1 value into ball.toml."}
         return None
@@ -233,7 +277,7 @@ class FakeLive:
         image.save(data, "jpeg" if moving else "png")
         scale = (
             {"low": 0, "high": 2.5e-6, "text": "difference, linear light", "colours": COLOURS}
-            if view["source"] == "heat"
+            if view["source"] in ("heat", "variable")
             else None
         )
         header = {

@@ -28,11 +28,20 @@ from glshade.live.messages import (
     Judged,
     Load,
     Loaded,
+    LostDigits,
+    MeasureDigits,
     Pick,
     Picked,
+    Probe,
+    Probed,
+    ReadSource,
     Reference,
     Request,
     Restore,
+    ShowVariable,
+    Source,
+    Trace,
+    Traced,
     Verify,
 )
 from glshade.live.server import Listener, serve
@@ -99,7 +108,17 @@ class FakeChild:
             return Judged(id=0, verdict="verified", text="verified", revision=1)
         if isinstance(request, Pick):
             return Picked(id=0, object="ball", key="objects.0")
-        assert isinstance(request, Draw | Reference)
+        if isinstance(request, Probe):
+            black = (0, 0, 0)
+            return Probed(id=0, x=request.x, y=request.y, value=black, reference=black, low=black, high=black, kind="interior")
+        if isinstance(request, Trace):
+            return Traced(id=0, x=request.x, y=request.y, object=0, steps=[{"name": "NoL"}], revision=self.shown)
+        if isinstance(request, MeasureDigits):
+            lines = [{"file": "a.glsl", "line": 3}]
+            return LostDigits(id=0, object=request.object, lines=lines, revision=self.shown)
+        if isinstance(request, ReadSource):
+            return Source(id=0, object=request.object, name="ball", files=[{"file": "a.glsl"}], revision=self.shown)
+        assert isinstance(request, Draw | Reference | ShowVariable)
         width, height = request.view.get("size") or (4, 3)
         return Frame(id=0, data=PICTURE, width=width, height=height, revision=self.shown)
 

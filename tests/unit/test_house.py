@@ -18,8 +18,8 @@ PACKAGE = ROOT / "glshade"
 # A room imports from the rooms before it.
 ROOMS = (
     *("optics", "image", "page", "lights", "presets", "textures", "mesh", "brdfs", "scene", "assembly", "radiance"),
-    *("glsl", "gl", "reference", "driver", "verification", "catalogue", "pyrender", "tradeoff", "golden"),
-    *("live", "batch", "bench", "cli"),
+    *("glsl", "spirv", "gl", "reference", "debug", "driver", "verification", "catalogue", "pyrender", "tradeoff"),
+    *("golden", "live", "batch", "bench", "cli"),
 )
 # Modules of no room, which every room may import. They import no room.
 BASE = {"errors", "found", "document", "files", "limits", "arrays", "version", "lru", "problem"}

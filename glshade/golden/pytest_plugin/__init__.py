@@ -12,6 +12,7 @@ import pytest
 
 if TYPE_CHECKING:
     from collections.abc import Generator
+    from pathlib import Path
 
     from glshade.golden.pytest_plugin.process import Process
     from glshade.golden.pytest_plugin.regression import RenderRegression
@@ -26,6 +27,7 @@ OPTIONS = (
     ("update", "WHICH", "baselines to write: none, missing, failed, all or variant [none]"),
     ("summary", "KINDS", "summaries to write: html, json, junit, with commas between several [html]"),
     ("stability", "N", "draw each picture N times, and fail if the drawings differ [1]"),
+    ("shaders", "FOLDERS", "folders of shaders that files *.test.glsl include, with commas between several"),
     ("disallow-unused", "", "fail the run if there are baselines that no test uses"),
 )
 
@@ -72,10 +74,20 @@ def _process(config: pytest.Config) -> Process:
 
 @pytest.fixture
 def render_regression(request: pytest.FixtureRequest) -> RenderRegression:
-    """Compares pictures with baselines: `check(picture)`, `same(a, b)` and `laws(scene)`."""
+    """Compares pictures with baselines: `check(picture)`, `same(a, b)`, `laws(scene)` and `digits(model)`."""
     from glshade.golden.pytest_plugin.regression import RenderRegression
 
     return RenderRegression.of(_process(request.config), request)
+
+
+def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
+    """Collects files of unit tests that are written in GLSL."""
+    if not file_path.name.endswith(".test.glsl"):
+        return None
+    from glshade.golden.pytest_plugin.glsl_tests import ShaderTestFile
+
+    file: pytest.Collector = ShaderTestFile.from_parent(parent, path=file_path)
+    return file
 
 
 def pytest_itemcollected(item: pytest.Item) -> None:
@@ -139,7 +151,12 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Closes the OpenGL context."""
+    """Closes the OpenGL contexts."""
+    import sys
+
+    glsl_tests = sys.modules.get("glshade.golden.pytest_plugin.glsl_tests")
+    if glsl_tests is not None:
+        glsl_tests.close(config)
     process = config.stash.get(KEY, None)
     if process is not None and process.active is not None:
         process.active.close()

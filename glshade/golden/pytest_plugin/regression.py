@@ -90,6 +90,15 @@ class RenderRegression:
         __tracebackhide__ = True
         _fail(lambda: self._broken_laws(scene))
 
+    def digits(self, model: object, *, limit: float = 1e-6) -> None:
+        """Fails the test if a line of a model's GLSL loses digits in float32 (docs/digits.md).
+
+        model: a model's name or class, or a material.
+        limit: the loss that a line may have, relative to the result. Lines that are not to blame may lose more.
+        """
+        __tracebackhide__ = True
+        _fail(lambda: self._lost_digits(model, limit))
+
     def _check(self, draw: Callable[[], object], ready_made: bool, name: str | None, **options: Any) -> None:
         """Compares a picture with its baseline, and fails the test unless they are the same.
 
@@ -135,6 +144,26 @@ class RenderRegression:
         scene = given if isinstance(given, Scene) else load(Path(given))
         findings = list(check_laws(scene, renderer=self._run.renderer()))
         return "\n".join(messages.broken_law(finding, LAWS[finding.law]) for finding in findings if finding.broken)
+
+    def _lost_digits(self, model: object, limit: float) -> str:
+        """Returns the lines of a model that lose more digits than allowed, a line each; empty if there is none.
+
+        Errors: GlshadeError.
+        """
+        from glshade.brdfs import BRDFS, Brdf
+        from glshade.catalogue.digits import digits_of_material, digits_of_model
+        from glshade.document import nearest
+
+        if isinstance(model, Brdf):
+            found = digits_of_material(model)
+        elif isinstance(model, type) and issubclass(model, Brdf):
+            found = digits_of_model(model)
+        elif isinstance(model, str) and model in BRDFS:
+            found = digits_of_model(BRDFS[model])
+        else:
+            raise GlshadeError(f"digits() needs a model or a material; no model is named {model!r}{nearest(str(model), BRDFS)}")
+        lines = [f"{loss.place}: loses {loss.loss:.1e} of the result: {loss.text}" for loss in found.bad if loss.loss > limit]
+        return "\n".join(lines)
 
     def _claim(self, name: str) -> None:
         """Notes that the test uses a baseline. Errors: GlshadeError where it is used already."""

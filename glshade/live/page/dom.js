@@ -25,16 +25,16 @@ export function announce(text) {
   find("announcement").textContent = text;
 }
 
-// Makes a tab list work: click, arrow keys, Home and End.
-export function tabs(list) {
+// Makes a tab list work: click, arrow keys, Home and End. `selected(tab)` is called after each choice.
+export function tabs(list, selected = () => {}) {
   const all = [...list.querySelectorAll("[role=tab]")];
   const select = (chosen) => {
     for (const tab of all) {
-      const selected = tab === chosen;
-      tab.setAttribute("aria-selected", selected);
-      tab.tabIndex = selected ? 0 : -1;
-      find(tab.getAttribute("aria-controls")).hidden = !selected;
+      tab.setAttribute("aria-selected", tab === chosen);
+      tab.tabIndex = tab === chosen ? 0 : -1;
+      find(tab.getAttribute("aria-controls")).hidden = tab !== chosen;
     }
+    selected(chosen);
   };
   const steps = { ArrowRight: 1, ArrowLeft: -1 };
   list.addEventListener("click", (event) => event.target.closest("[role=tab]") && select(event.target.closest("[role=tab]")));

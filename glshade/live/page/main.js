@@ -6,9 +6,10 @@ import { Changes } from "./changes.js";
 import { Connection } from "./connection.js";
 import { Controls } from "./controls.js";
 import { announce, element, find, tabs } from "./dom.js";
-import { hideProbe, showProbe } from "./probe.js";
+import { hideProbe, showProbe, showTrace } from "./probe.js";
 import { showProblems } from "./problems.js";
 import { showPrograms } from "./programs.js";
+import { Source } from "./source.js";
 import { Stage } from "./stage.js";
 import { belongs, options, Values } from "./values.js";
 import { Verdict } from "./verdict.js";
@@ -37,6 +38,7 @@ const values = new Values((moving) => {
   followCamera();
   controls.update();
   changes.update();
+  source.forget();
   request(moving);
 });
 const controls = new Controls(values);
@@ -55,6 +57,10 @@ const stage = new Stage({
   clear,
 });
 const verdict = new Verdict({ mark: (pixels) => stage.mark(pixels), probe: (x, y) => probe(0, x, y) });
+const source = new Source({
+  files: (object) => connection.send({ type: "source", object }),
+  digits: (object) => connection.send({ type: "digits", object }),
+});
 const connection = new Connection({ opened, closed, message, frame });
 
 // --- the view, to the server --------------------------------------------------------------------------------------------
@@ -124,6 +130,12 @@ function probe(pane, x, y) {
   connection.send({ type: "probe", pane, x, y });
 }
 
+// Whether an answer is about the pixel under the cross.
+function isProbed({ x, y }) {
+  const cross = stage.panes[0].cross;
+  return cross?.[0] === x && cross?.[1] === y;
+}
+
 function clear() {
   stage.cross(null);
   hideProbe();
@@ -146,14 +158,30 @@ const RECEIVE = {
   state: received,
   picked: ({ key, object, material }) => {
     controls.select(key ?? null);
-    tab(find("tab-values"));
+    const index = state.server.info.objects.findIndex((candidate) => candidate.key === key);
+    if (source.visible && index >= 0) source.choose(index);
+    else tab(find("tab-values"));
     announce(object ? `${object}, material ${material}` : "Background");
   },
   probed: (answer) => {
     const { canvas, size } = stage.panes[answer.pane ?? 0];
     showProbe(answer, canvas, canvas.width / size[0]);
   },
-  judged: (answer) => verdict.show(answer),
+  traced: (answer) => {
+    if (!isProbed(answer)) return;
+    const open = (step) => {
+      source.choose(answer.object, step);
+      if (!source.visible) tab(find("tab-source"));
+    };
+    showTrace(answer, { open, show: (step) => showVariable({ ...step, object: answer.object }) });
+  },
+  source: (answer) => source.receive(answer),
+  digits: (answer) => source.receiveDigits(answer),
+  judged: (answer) => {
+    verdict.show(answer);
+    // A measurement that another view has cancelled is made now, while the judge is idle.
+    if (answer.state !== "judging") source.measure();
+  },
   written: ({ ok, text }) => {
     if (ok) state.written = Object.keys(values.set);
     changes.say(text, ok);
@@ -180,6 +208,7 @@ function received(server) {
   views.fill(info.layers ?? []);
   fillCameras(info.cameras ?? []);
   controls.show(groups, info.objects ?? []);
+  source.renew(server.stale ? server.stale_of : server.revision, info.objects ?? []);
   showPrograms(info, server.milliseconds);
   const spoken = showProblems(server);
   notify();
@@ -224,7 +253,8 @@ async function frame(pane, header, blob) {
   document.dispatchEvent(new CustomEvent("glshade:frame", { detail: header }));
   clearTimeout(state.judge);
   const current = header.still && header.width && !state.moving && header.number === state.number;
-  if (current && isJudged(views.panes[0].choice)) state.judge = setTimeout(() => connection.send({ type: "judge" }), STOOD_STILL);
+  if (current && !isJudged(views.panes[0].choice)) source.measure();
+  else if (current) state.judge = setTimeout(() => connection.send({ type: "judge" }), STOOD_STILL);
 }
 
 function status({ width, height, still, mime, milliseconds = {}, non_finite: bad }) {
@@ -268,14 +298,25 @@ function closed(text) {
 
 // --- the toolbar --------------------------------------------------------------------------------------------------------
 
-function arrange() {
+function place() {
   stage.arrange(views.layout);
   views.panes.forEach(({ title }, index) => (stage.panes[index].caption.textContent = title));
+}
+
+// Shows a variable beside the picture; the probe that lists it stays.
+function showVariable(variable) {
+  views.show(variable);
+  place();
+  request(false);
+}
+
+function arrange() {
+  place();
   verdict.show({ state: "none" });
   clear();
 }
 
-const tab = tabs(document.querySelector("[role=tablist]"));
+const tab = tabs(document.querySelector("[role=tablist]"), () => source.visible && source.ask());
 find("reset").addEventListener("click", reset);
 find("camera").addEventListener("change", ({ target }) => {
   state.camera = target.selectedIndex;

@@ -1,9 +1,12 @@
-// The values of one pixel: what the GPU drew, what the reference says, and the interval in which a right value lies.
+// The values of one pixel: what the GPU drew, what the reference says, and the interval in which a right value lies. Below them,
+// the variables of the program that shaded it.
 
 import { announce, element, find } from "./dom.js";
 
 const LOUPE = 15; // the loupe shows this many pixels a side
 const CELL = 8; // size of a pixel in the loupe [pixels of the screen]
+
+const MANY = 3; // so many lost digits are marked
 
 const figure = (value) => (typeof value === "number" ? value.toPrecision(6) : String(value ?? "–"));
 
@@ -22,12 +25,44 @@ export function showProbe(answer, canvas, scale) {
       answer.value ? table(answer) : null,
       element("p", {}, [answer.class ?? answer.kind, answer.text].filter(Boolean).join(". ")),
     ),
+    element("div", { id: "trace", class: "trace", tabindex: "0", "aria-label": "Variables" }, element("p", { class: "quiet" }, "The variables are computed …")),
   );
   announce(`Pixel ${x}, ${y}: ${(answer.value ?? []).slice(0, 3).map(figure).join(", ")}. ${answer.class ?? answer.kind ?? ""}`);
 }
 
 export function hideProbe() {
   find("probe").hidden = true;
+}
+
+// Shows the variables of the pixel that is shown.
+// handlers: show(step) shows a variable as a picture, open(step) shows its line
+export function showTrace({ steps = [], left_out: rest = 0, text }, handlers) {
+  const section = find("trace");
+  if (!section) return;
+  const note = text || (steps.length ? "" : "No program shades the background.");
+  const head = ["line", "variable", "float64", "float32", "lost digits"].map((name) => element("th", { scope: "col" }, name));
+  section.replaceChildren(
+    note ? element("p", { class: "quiet" }, note) : "",
+    steps.length
+      ? element("table", { class: "figures" }, element("thead", {}, element("tr", {}, ...head)), element("tbody", {}, ...steps.map((step) => row(step, handlers))))
+      : "",
+    rest ? element("p", { class: "quiet" }, `${rest} further values are not listed.`) : "",
+  );
+  announce(note || `${steps.length} values of variables`);
+}
+
+function row(step, { show, open }) {
+  const link = (text, title, onclick) => element("button", { class: "plain", type: "button", title, onclick }, text);
+  const again = step.number ? ` (${step.number + 1})` : ""; // a line that runs several times
+  return element(
+    "tr",
+    { class: step.digits > MANY ? "bad" : null },
+    element("td", {}, link(`${step.short}:${step.line}`, step.text, () => open(step))),
+    element("th", { scope: "row" }, step.picture ? link(step.name + again, "Show as a picture", () => show(step)) : step.name + again),
+    element("td", { title: step.float64 }, step.float64),
+    element("td", { title: step.float32 }, step.float32),
+    element("td", {}, step.digits >= 0.05 ? step.digits.toFixed(1) : ""),
+  );
 }
 
 function table({ value, reference, low, high }) {

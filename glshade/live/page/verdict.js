@@ -10,6 +10,8 @@ const TEXTS = {
   inconclusive: "Inconclusive",
 };
 
+const OWN_TEXT = "Verified against its own text";
+
 export class Verdict {
   // handlers: mark(pixels) shows pixels on the picture, probe(x, y) asks for the values of one
   constructor(handlers) {
@@ -25,9 +27,10 @@ export class Verdict {
     this.show({ state: "none" });
   }
 
-  show({ state, text = "", unexplained = 0, pixels = [] }) {
+  // derived: whether the picture was compared with its own GLSL, because a model has no reference
+  show({ state, text = "", unexplained = 0, pixels = [], derived = false }) {
     const pixelsText = unexplained === 1 ? "1 pixel unexplained" : `${unexplained} pixels unexplained`;
-    this.badge.textContent = unexplained ? pixelsText : TEXTS[state];
+    this.badge.textContent = unexplained ? pixelsText : derived && state === "verified" ? OWN_TEXT : TEXTS[state];
     this.badge.dataset.state = state;
     this.badge.title = text;
     this.pixels = pixels;

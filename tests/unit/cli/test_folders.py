@@ -127,10 +127,13 @@ def test_a_model_without_a_python_file(run: Run) -> None:
         sweep = ("--sweep", "lights.0.intensity=1,0.5", "-o", "{intensity}.exr", "--jobs", "2", "--overwrite")
         assert run("render", "slate.toml", *sweep, option, folder).code == 0
         assert value("1.exr") == pytest.approx(VALUE, rel=1e-3)
-        for command in (("verify",), ("render", "--reference", "-o", "x.exr")):
-            done = run(*command, "slate.toml", option, folder)
-            assert done.code == 7
-            assert 'slate.glsl: the model "slate" has no reference' in done.err
+        if shutil.which("glslangValidator"):
+            done = run("verify", "slate.toml", option, folder)
+            assert done.code == 0
+            assert done.out.startswith("slate.toml: verified against its own text: ")
+        done = run("render", "--reference", "-o", "x.exr", "slate.toml", option, folder)
+        assert done.code == 7
+        assert 'slate.glsl: the model "slate" has no reference' in done.err
         path.unlink()
     write(Path(), "models/slate.glsl", glsl)
     assert re.search(r"^slate .* no reference$", run("brdfs", "--models", "models").out, flags=re.MULTILINE)

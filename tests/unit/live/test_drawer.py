@@ -14,7 +14,7 @@ from support.drawn import FROM_ABOVE, SCENE, Drawn, drawn, pixels_of
 
 from glshade import Image, Renderer, load
 from glshade.live import drawer as drawing
-from glshade.live.messages import JPEG, PNG, Draw, Failed, Loaded, Pick, Picked, Restore, Save, Saved
+from glshade.live.messages import JPEG, PNG, Draw, Failed, Loaded, Pick, Picked, ReadSource, Restore, Save, Saved, Source
 
 
 @pytest.fixture
@@ -278,6 +278,29 @@ def test_an_object_can_be_picked(live: Drawn) -> None:
     assert isinstance(empty, Picked)
     assert empty.object is None
     assert isinstance(live.ask(Pick(view={}, x=48, y=0)), Failed)
+
+
+def test_the_files_of_an_object_are_those_that_are_drawn(live: Drawn) -> None:
+    live.load()
+    answer = live.ask(ReadSource(view={}, object=0))
+    assert isinstance(answer, Source)
+    assert (answer.name, answer.object, answer.revision) == ("one", 0, 1)
+    assert answer.files[0]["name"] == "brdf/phong.glsl"
+    assert "\n".join(answer.files[0]["lines"]) == live.shipped("phong").rstrip("\n")
+    names = [file["name"] for file in answer.files]
+    assert len(set(names)) == len(names)
+    assert {"pass/phong.frag", "pass/phong.vert", "light/directional.glsl", "<surface>"} <= set(names)
+    assert "brdf/lambert.glsl" not in names
+    flat = live.ask(ReadSource(view={"shading": "flat"}, object=0))
+    assert isinstance(flat, Source)
+    assert "pass/flat.vert" in [file["name"] for file in flat.files]
+
+    live.write("phong", "broken {")
+    live.load()
+    assert live.ask(ReadSource(view={}, object=0)) == answer
+    missing = live.ask(ReadSource(view={}, object=7))
+    assert isinstance(missing, Failed)
+    assert "objects[7]" in missing.problems[0]["message"]
 
 
 def test_gl_objects_are_let_go(live: Drawn) -> None:

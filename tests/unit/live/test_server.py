@@ -22,7 +22,19 @@ from websockets.sync.client import connect
 from glshade.errors import GlshadeError
 from glshade.live import session as session_module
 from glshade.live import viewer as viewer_module
-from glshade.live.messages import Draw, Load, Loaded, Pick, Restore, Verify
+from glshade.live.messages import (
+    Draw,
+    Load,
+    Loaded,
+    MeasureDigits,
+    Pick,
+    Probe,
+    ReadSource,
+    Restore,
+    ShowVariable,
+    Trace,
+    Verify,
+)
 from glshade.live.server import Listener
 from glshade.live.wire import LARGEST_MESSAGE
 
@@ -210,6 +222,59 @@ class TestPage:
             assert (picked["object"], picked["key"], picked["pane"], picked["x"], picked["y"]) == ("ball", "objects.0", 0, 2, 1)
             assert (calm.drawer.asked[-1].x, calm.drawer.asked[-1].y) == (2, 1)
 
+    def test_a_probe_is_followed_by_the_variables_of_the_pixel(self, calm: Running) -> None:
+        with calm.page() as page:
+            page.view()
+            page.send("probe", x=2, y=1)
+            assert page.receive("probed")["class"] == "interior"
+            traced = page.receive("traced")
+            assert (traced["x"], traced["y"], traced["pane"], traced["steps"]) == (2, 1, 0, [{"name": "NoL"}])
+            assert [type(request) for request in calm.judge.asked[-2:]] == [Probe, Trace]
+
+    def test_variables_that_cannot_be_had_have_a_reason(self, server: Running) -> None:
+        server.judge.answer = lambda request: failure("no compiler") if isinstance(request, Trace | MeasureDigits) else None
+        server.drawer.answer = lambda request: failure("no such object") if isinstance(request, ReadSource) else None
+        with server.page() as page:
+            page.view()
+            page.send("probe", x=2, y=1)
+            traced = page.receive("traced")
+            assert (traced["text"], traced["x"], traced["y"]) == ("no compiler", 2, 1)
+            page.send("source", object=4)
+            assert {**page.receive("source"), "type": ""} == {"type": "", "files": [], "text": "no such object", "object": 4}
+            page.send("digits", object=4)
+            assert {**page.receive("digits"), "type": ""} == {"type": "", "lines": [], "text": "no compiler", "object": 4}
+
+    def test_the_files_of_an_object_and_its_lost_digits(self, calm: Running) -> None:
+        with calm.page() as page:
+            page.view()
+            page.send("source", object=3)
+            source = page.receive("source")
+            assert (source["object"], source["files"], source["revision"]) == (3, [{"file": "a.glsl"}], 1)
+            page.send("digits", object=3)
+            digits = page.receive("digits")
+            assert (digits["object"], digits["lines"], digits["revision"]) == (3, [{"file": "a.glsl", "line": 3}], 1)
+
+    def test_an_edit_cancels_the_measurement_of_digits(self, server: Running) -> None:
+        server.judge.release.clear()
+        with server.page() as page:
+            page.view(1)
+            page.send("digits", object=0)
+            _until(lambda: server.judge.asked)
+            server.change("scene.toml")
+            assert page.nothing("digits", 0.15)
+            page.send("digits", object=0)
+            assert page.receive("digits")["revision"] == 2
+
+    def test_a_variable_is_a_picture_of_the_judge(self, calm: Running) -> None:
+        variable = {"object": 0, "place": "a.glsl:3", "name": "NoL"}
+        with calm.page() as page:
+            page.view(1, moving=True, panes=[{"source": "variable", "variable": variable}])
+            assert page.nothing("frame", 0.15)
+            page.view(2, panes=[{"source": "variable", "variable": variable}])
+            assert page.receive("frame")["number"] == 2
+            (asked,) = [request for request in calm.judge.asked if isinstance(request, ShowVariable)]
+            assert asked.view["variable"] == {**variable, "number": 0}
+
     def test_judge(self, calm: Running) -> None:
         with calm.page() as page:
             page.view()
@@ -280,7 +345,10 @@ class TestHostilePages:
             ('{"type": "view", "number": 1, "panes": [{"source": "https://evil.example"}]}', "view.panes.0.source"),
             ('{"type": "view", "number": 1, "panes": [{"camera": {"eye": [0, NaN, 0]}}]}', "view.panes.0.camera.eye.1"),
             ('{"type": "view", "number": 1, "panes": [{"unknown": 1}]}', "view.panes.0.unknown"),
+            ('{"type": "view", "number": 1, "panes": [{"variable": {"object": 0}}]}', "view.panes.0.variable.place"),
             ('{"type": "pick", "x": -1, "y": 0}', "pick.x"),
+            ('{"type": "source", "object": -1}', "source.object"),
+            ('{"type": "digits", "object": 1e9}', "digits.object"),
             ('{"type": "write", "values": {}}', "write.values"),
             (b"\x00\xff", "a page sends text messages only"),
         ],

@@ -14,7 +14,7 @@ from support.glsl import called
 from glshade import BRDFS, Renderer, evaluate
 from glshade.brdfs.blinn_phong import half_vector
 from glshade.catalogue.albedo import directional_albedo
-from glshade.gl.evaluation import generated
+from glshade.glsl.generator import value_code
 from glshade.glsl.shaders import SHIPPED, expand
 from glshade.optics.microfacet import LEAST_ROUGHNESS, alpha, alphas, d_beckmann, ggx_cos, ierfc, smith_beckmann, v_groove
 
@@ -224,7 +224,7 @@ def test_highlights_are_longer_along_the_tangent() -> None:
 
 def test_what_a_material_does_not_need_is_not_in_its_program() -> None:
     def text(material: Any) -> str:
-        return expand("pass/evaluate.vert", generated(material)).text
+        return expand("pass/evaluate.vert", value_code(material)).text
 
     ggx, metal, beckmann = BRDFS["ggx"], BRDFS["metal"], BRDFS["beckmann"]
     assert "dot(f.t" not in text(ggx())

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import importlib
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from glshade import BRDFS
 
 ROOT = Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "script"))
+accuracy = importlib.import_module("accuracy")
 PAGE = (ROOT / "docs" / "accuracy.md").read_text(encoding="utf-8")
 
 
@@ -30,3 +36,25 @@ def test_no_figure_is_above_its_bound_at_the_extremes() -> None:
 def test_it_says_what_was_measured() -> None:
     assert "Driver: " in PAGE
     assert "Made by script/make-accuracy" in PAGE
+
+
+def test_a_quoted_line_that_changes_is_noticed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    assert accuracy.moved(PAGE) == []
+    shutil.copytree(ROOT / "shaders", tmp_path / "shaders")
+    monkeypatch.setattr(accuracy, "ROOT", tmp_path)
+    assert accuracy.moved(PAGE) == []
+    path = tmp_path / "shaders" / "math" / "cos_half.glsl"
+    path.write_text(path.read_text().replace("0.25 * dot(q, q)", "dot(q, q) * 0.25"))
+    assert set(accuracy.moved(PAGE)) == {"math/cos_half.glsl:6"}
+    assert accuracy.moved(PAGE.split("## Line by line")[0]) == ["no line"]
+
+
+@pytest.mark.slow
+def test_every_line_that_is_to_blame_has_its_reason_and_its_row() -> None:
+    lost = accuracy.lost()
+    bad = {(accuracy.where(loss)[0], loss.text) for _, loss in lost if loss.to_blame}
+    assert bad == accuracy.REASONS.keys()
+    for model, loss in lost:
+        if loss.to_blame:
+            file, line = accuracy.where(loss)
+            assert f"| `{model}` | {file}:{line} |" in PAGE
