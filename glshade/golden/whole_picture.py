@@ -169,9 +169,9 @@ def _shifted(change: Change) -> Iterator[Fault]:
 
 
 def _offsets(change: Change) -> list[tuple[int, int]]:
-    """Returns the shifts (right, down) [pixels] that are most likely, the likeliest first; never (0, 0).
+    """Returns the shifts (right, down) [pixels] to try: the shortest ones, and those that are most likely; never (0, 0).
 
-    They are found in a part of the picture round the pixels that changed.
+    The likely ones are found in a part of the picture round the pixels that changed.
     """
     width, height = change.size
     rows, columns = np.divmod(change.pixel[change.amount > 0], width)
@@ -183,11 +183,14 @@ def _offsets(change: Change) -> list[tuple[int, int]]:
         return []
     numbers = (np.array(box[0])[:, None] * width + np.array(box[1])).reshape(-1)
     grey = (change.shown(change.values(p, numbers)).sum(axis=1).reshape(shape) for p in (change.truth, change.test))
-    truth, test = (np.fft.rfft2(values - values.mean()) for values in grey)
+    # The border of the part does not move with the picture. A window fades it out (Hann), or it would hide a shift.
+    window = np.outer(*(np.hanning(side + 2)[1:-1] for side in shape))
+    truth, test = (np.fft.rfft2((values - values.mean()) * window) for values in grey)
     cross = test * np.conj(truth)
     peaks = np.fft.irfft2(cross / np.maximum(np.abs(cross), 1e-9), s=shape)
     peaks[0, 0] = -np.inf
-    found = []
+    # The shortest shifts are the most common ones, and smooth pictures have no sharp peak.
+    found = [(right, down) for down in (-1, 0, 1) for right in (-1, 0, 1) if right or down]
     for index in np.argsort(peaks, axis=None)[: -LIKELY - 1 : -1]:
         place = divmod(int(index), shape[1])
         down, right = (at - side if at > side // 2 else at for at, side in zip(place, shape, strict=True))

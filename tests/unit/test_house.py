@@ -169,7 +169,8 @@ def test_pytest_loads_no_more_of_the_plugin_than_it_must_know(python: Any, tmp_p
     """A run of pytest in which no test uses the plugin pays for its options and hooks alone."""
     (tmp_path / "test_nothing.py").write_text("def test_nothing(): pass\n", encoding="utf-8")
     run = "import pytest; assert pytest.main(['-q', '-p', 'no:cacheprovider', 'test_nothing.py']) == 0; print()"
-    found = set(python(f"{run}; import sys; print(*sys.modules)", cwd=tmp_path).split())
+    printed = python(f"{run}; import sys; print(*sys.modules)", cwd=tmp_path)
+    found = set(printed.splitlines()[-1].split())
     plugin = "glshade.golden.pytest_plugin"
     assert {name for name in found if name.startswith("glshade")} == {"glshade", "glshade.version", "glshade.golden", plugin}
     assert not found & HEAVY
