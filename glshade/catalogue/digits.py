@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -12,12 +11,9 @@ from numpy.typing import NDArray
 
 from glshade.brdfs import Brdf, numbers
 from glshade.glsl.shaders import Shaders, current
-from glshade.radiance.draw import Draw
 from glshade.radiance.readying import ready
-from glshade.radiance.surface import Surface, at_vertices
 from glshade.reference.inputs import prepare
-from glshade.reference.raster import Fragments, rasterise, resolve
-from glshade.reference.shade import AT_CENTRE, is_there, surface_at
+from glshade.reference.visible import VisiblePart, visible_parts
 from glshade.scene.scene import Scene
 from glshade.spirv.digits import Digits, joined, measure_digits
 from glshade.spirv.model import model_text
@@ -69,65 +65,34 @@ def digits_of_scene(scene: Scene, count: int = COUNT, seed: int = 1, shaders: Sh
     Errors: SceneError, ShaderError, MissingLibrary.
     """
     shown = list(_shown(scene, shaders))
-    pixels = sum(len(part.pixels) for part in shown)
+    pixels = sum(len(part.pixel) for part, _ in shown)
     found = []
-    for part in shown:
-        wanted = math.ceil(count * len(part.pixels) / pixels)
-        chosen = np.unique(part.points[np.linspace(0, len(part.pixels) - 1, wanted).astype(np.intp)])
-        found += [program.digits(part_of(part.surface, chosen), seed) for program in part.programs]
+    for part, programs in shown:
+        wanted = math.ceil(count * len(part.pixel) / pixels)
+        chosen = np.unique(part.point[np.linspace(0, len(part.pixel) - 1, wanted).astype(np.intp)])
+        found += [program.digits(part_of(part.surface, chosen), seed) for program in programs]
     return joined(found)
 
 
 def errors_of_scene(scene: Scene, seed: int = 1, shaders: Shaders | None = None) -> Array:
     """Returns the largest relative error of each pixel (H, W) with all lines rounded; 0 for the background.
 
-    The pixels of instances that are shaded per vertex have the largest error of their triangle.
+    The pixels of instances that are shaded per vertex have the error of the nearest corner of their triangle.
     Errors: SceneError, ShaderError, MissingLibrary.
     """
     inputs = prepare(scene)
     errors = np.zeros(inputs.size[0] * inputs.size[1])
-    for part in _shown(scene, shaders):
-        for program in part.programs:
-            of_pixels = program.errors(part.surface, seed)[part.points].max(axis=1)
-            errors[part.pixels] = np.maximum(errors[part.pixels], of_pixels)
+    for part, programs in _shown(scene, shaders):
+        for program in programs:
+            errors[part.pixel] = np.maximum(errors[part.pixel], program.errors(part.surface, seed)[part.point])
     return errors[inputs.wanted]
 
 
-@dataclass(frozen=True, eq=False)
-class _Shown:
-    """What a picture shows of an instance.
+def _shown(scene: Scene, shaders: Shaders | None) -> Iterator[tuple[VisiblePart, tuple[Program, ...]]]:
+    """Yields what a picture shows of each instance, and the programs that shade it.
 
-    programs: the programs that shade it.
-    surface: the points (N,) at which they are run.
-    pixels: (M,), the numbers of the pixels that show it.
-    points: (M, K), the points whose light each of these pixels shows.
+    Errors: SceneError, ShaderError, MissingLibrary.
     """
-
-    programs: tuple[Program, ...]
-    surface: Surface
-    pixels: NDArray[np.intp]
-    points: NDArray[np.intp]
-
-
-def _shown(scene: Scene, shaders: Shaders | None) -> Iterator[_Shown]:
-    """Yields what a picture shows of each instance. Errors: SceneError, ShaderError, MissingLibrary."""
-    inputs, assembly = prepare(scene), ready(scene)
-    nearest, _ = resolve(inputs, rasterise(inputs), lambda fragments: is_there(inputs, fragments, AT_CENTRE))
-    for number, draw in enumerate(inputs.draws):
-        fragments = nearest.take(nearest.draw == number)
-        if len(fragments):
-            surface, points = _shaded_points(draw, fragments, inputs.size)
-            yield _Shown(surface_text(scene, assembly, draw, shaders or current()).programs, surface, fragments.pixel, points)
-
-
-def _shaded_points(draw: Draw, fragments: Fragments, size: tuple[int, int]) -> tuple[Surface, NDArray[np.intp]]:
-    """Returns the points at which a draw is shaded, and the points (N, K) that each of its fragments shows."""
-    if draw.instance.rate == "phong":
-        surface = surface_at(draw, fragments, size, AT_CENTRE)
-        side = np.where(fragments.front | (not draw.instance.back_faces), 1.0, -1.0)
-        return replace(surface, side=side), np.arange(len(fragments))[:, None]
-    if draw.instance.rate == "gouraud":
-        vertices, points = np.unique(draw.triangles[fragments.triangle], return_inverse=True)
-        return at_vertices(draw, vertices, np.float64), points.reshape(-1, 3)
-    faces, points = np.unique(fragments.triangle, return_inverse=True)
-    return at_vertices(draw, draw.triangles[faces, 2], np.float64, centroids=True), points[:, None]
+    assembly = ready(scene)
+    for part in visible_parts(prepare(scene)):
+        yield part, surface_text(scene, assembly, part.draw, shaders or current()).programs
