@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.spirv.arithmetic import ULP, Arithmetic
+from glshade.spirv.arithmetic import NEAREST, ULP, Arithmetic
 from glshade.spirv.operations import DIVISION, Operation, dot
 
 Array = NDArray[Any]
@@ -115,9 +115,14 @@ def _cross(arithmetic: Arithmetic, line: int, a: Array, b: Array) -> Array:
 
 
 def _mix(arithmetic: Arithmetic, line: int, x: Array, y: Array, a: Array) -> Array:
-    """Returns x (1 - a) + y a, the form of the specification."""
+    """Returns x (1 - a) + y a, the form of the specification.
+
+    Many drivers compute x + a (y - x), whose error is relative to the larger of x and y.
+    """
     first = arithmetic.rounded(x * arithmetic.rounded(1 - a, line), line)
-    return arithmetic.rounded(first + arithmetic.rounded(y * a, line), line)
+    result = first + arithmetic.rounded(y * a, line)
+    larger = ULP * np.maximum(np.abs(x), np.abs(y))
+    return arithmetic.rounded(result, line, np.maximum(NEAREST, _in_ulps(larger, result)))
 
 
 def _smoothstep(arithmetic: Arithmetic, line: int, low: Array, high: Array, x: Array) -> Array:
