@@ -53,7 +53,7 @@ def _with_floor(function: Callable[..., Array], ulps: float, floor: float) -> Op
     return operation
 
 
-def _in_ulps(error: float, values: Array) -> Array:
+def _in_ulps(error: Array | float, values: Array) -> Array:
     """Returns an absolute error as a number of ulps of values. Zero has no ulp that an error could be a multiple of."""
     return np.divide(error, ULP * np.abs(values), out=np.zeros(np.shape(values)), where=np.abs(values) > 0)
 
