@@ -81,11 +81,11 @@ def differences(scene: Scene, inputs: Inputs, shading: Rate | None, shaders: Sha
         surface = part_of(part.surface, slice(None, None, step))
         twin = evaluate_surface(replace(draw, text=None), surface)
         allowed = _allowed(draw, surface, twin)
-        error = np.abs(evaluate_surface(draw, surface) - twin) - allowed
-        differing = int(np.count_nonzero((error > 0).any(axis=1)))
-        if differing:
+        difference = np.abs(evaluate_surface(draw, surface) - twin)
+        beyond = difference > allowed
+        if beyond.any():
             line = _line(scene, assembly, draw, surface, twin, allowed, shaders)
-            largest = float((error + allowed).max())
+            differing, largest = int(np.count_nonzero(beyond.any(axis=1))), float(difference[beyond].max())
             yield (
                 f"the GLSL of {draw.instance.name} and the Python function of its model, {draw.instance.material.brdf}, differ "
                 f"at {differing} of {len(twin)} points, by up to {largest:.1e}{line}"
