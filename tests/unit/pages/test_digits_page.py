@@ -63,7 +63,7 @@ def test_it_quotes_what_the_command_prints() -> None:
 
 @pytest.mark.slow
 def test_the_python_shows_an_exact_and_another_value(python: object) -> None:
-    first, second = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
+    first, second, _ = re.findall(r"^```python\n(.*?)^```", PAGE, flags=re.MULTILINE | re.DOTALL)
     exact, gpu = (np.fromstring(line.strip("[]"), sep=" ") for line in python(first).splitlines())  # type: ignore[operator]
     assert exact == pytest.approx([0.23996731, 0.24251379, 0.25015322])
     assert np.abs(gpu - exact).max() > 0.01
