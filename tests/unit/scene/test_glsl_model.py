@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from support.folders import CHALK_GLSL, SCENE, VALUE, forget_models, write, write_models
+from support.texts import needs_compiler
 
 import glshade
 from glshade import BRDFS, Renderer
@@ -73,11 +74,17 @@ def test_a_model_without_ambient_reflectance_stays_black(models: Path, scene: Pa
     assert not renderer.render(glshade.load(scene, models=models), dtype="float32").pixels.any()
 
 
-def test_verify_says_that_there_is_no_reference(models: Path, scene: Path, renderer: Renderer) -> None:
+def test_there_is_no_reference_picture(models: Path, scene: Path) -> None:
     loaded = glshade.load(scene, models=models)
     with pytest.raises(NoReference, match=r'slate\.glsl: the model "slate" has no reference, because no slate\.py') as caught:
-        glshade.verify(loaded, renderer=renderer)
+        glshade.reference.render(loaded)
     assert caught.value.exit_code == 7
+
+
+@needs_compiler
+def test_verify_compares_with_the_glsl(models: Path, scene: Path, renderer: Renderer) -> None:
+    verdict = glshade.verify(glshade.load(scene, models=models), renderer=renderer)
+    assert verdict.words == "verified against its own text"
 
 
 def test_a_shader_folder_may_hold_models(tmp_path: Path, scene: Path) -> None:
