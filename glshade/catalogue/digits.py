@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from glshade.brdfs import Brdf, numbers
 from glshade.glsl.shaders import Shaders, current
 from glshade.radiance.readying import ready
+from glshade.radiance.surface import part_of
 from glshade.reference.inputs import prepare
 from glshade.reference.visible import VisiblePart, visible_parts
 from glshade.scene.scene import Scene
 from glshade.spirv.digits import Digits, joined, measure_digits
 from glshade.spirv.model import model_text
 from glshade.spirv.ranges import directions, parameters, variants
-from glshade.spirv.surface import Program, part_of, surface_text
+from glshade.spirv.surface import Program, surface_text
 
 Array = NDArray[Any]
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +9,7 @@ import click
 
 from glshade.cli._options import driver, unread_folders
 from glshade.errors import printable
+from glshade.github import annotation, path_in_repository
 
 if TYPE_CHECKING:
     from glshade.gl.check import Check
@@ -76,20 +76,6 @@ def _annotation(problem: Problem) -> str:
     """Returns an error as a command of GitHub's workflows: `::error file=...,line=...,col=...::message`."""
     # A file of generated text is in no repository.
     is_file = bool(problem.file) and not problem.file.startswith("<")
-    place = {"file": _relative(problem.file), "line": problem.line, "col": problem.column} if is_file else {}
-    given = ",".join(f"{key}={_escaped(str(value), ':,')}" for key, value in place.items() if value is not None)
-    message = problem.message if is_file else str(problem)
-    return f"::error {given}::{_escaped(message)}" if given else f"::error::{_escaped(message)}"
-
-
-def _escaped(text: str, more: str = "") -> str:
-    """Returns a text in which the characters that end a part of an annotation are escaped. more: further such characters."""
-    for character in f"%\r\n{more}":
-        text = text.replace(character, f"%{ord(character):02X}")
-    return text
-
-
-def _relative(path: str) -> str:
-    """Returns a path relative to the current folder if it lies below that, else the path itself."""
-    relative = os.path.relpath(path)
-    return path if relative.startswith("..") else relative
+    if not is_file:
+        return annotation("error", str(problem))
+    return annotation("error", problem.message, file=path_in_repository(problem.file), line=problem.line, col=problem.column)

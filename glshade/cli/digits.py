@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,6 +10,7 @@ import click
 
 from glshade.cli._options import Size, filmed, models, overrides, shaders
 from glshade.errors import printable
+from glshade.github import annotation, path_in_repository
 
 if TYPE_CHECKING:
     from glshade.spirv.digits import Digits, LineLoss
@@ -220,11 +222,8 @@ def _row(loss: LineLoss) -> tuple[str, str, str, str, str, str]:
 
 def _short(place: str) -> str:
     """Returns a place with a path that is relative to the current folder where the file lies below it."""
-    import os
-
     file, _, line = place.rpartition(":")
-    relative = os.path.relpath(file) if os.path.isabs(file) else file
-    return f"{file if relative.startswith('..') else relative}:{line}"
+    return f"{path_in_repository(file) if os.path.isabs(file) else file}:{line}"
 
 
 def _value(value: Any) -> str:
@@ -236,4 +235,6 @@ def _annotation(loss: LineLoss) -> str:
     """Returns a line as an annotation of a GitHub workflow. A line that is generated stands in no file."""
     file, _, line = _short(loss.place).rpartition(":")
     message = f"rounding in this line loses {loss.loss:.1e} of the result, {loss.digits:.1f} digits"
-    return f"::warning::{loss.place}: {message}" if file.startswith("<") else f"::warning file={file},line={line}::{message}"
+    if file.startswith("<"):
+        return annotation("warning", f"{loss.place}: {message}")
+    return annotation("warning", message, file=file, line=line)

@@ -15,7 +15,7 @@ from glshade.debug.tracing import Trace, TracedStep, paired
 from glshade.errors import SceneError
 from glshade.glsl.shaders import Shaders, current
 from glshade.radiance.readying import ready
-from glshade.radiance.surface import Surface
+from glshade.radiance.surface import Surface, part_of
 from glshade.reference.inputs import Inputs, prepare
 from glshade.reference.visible import VisiblePart, visible_parts
 from glshade.scene.models import Folders, paths, use_models
@@ -23,7 +23,7 @@ from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
 from glshade.spirv.arithmetic import FLOAT32, FLOAT64, Arithmetic
 from glshade.spirv.digits import Digits, joined
-from glshade.spirv.surface import TILE, Program, part_of, surface_text
+from glshade.spirv.surface import TILE, Program, surface_text
 from glshade.spirv.trace import Recorder, Step
 
 # The number of points at which the digits of an object's program are measured. A line that is bad at one of a hundred points is

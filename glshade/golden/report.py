@@ -14,6 +14,7 @@ from xml.etree import ElementTree
 
 from glshade.errors import GlshadeError, printable
 from glshade.files import replacing
+from glshade.github import annotation
 from glshade.golden.result import Cause, Metrics, Outcome, Result, SceneVerdict
 
 # GitHub shows 10 errors and 10 warnings for a step, and drops the others.
@@ -153,8 +154,12 @@ def github_annotations(results: Sequence[Result]) -> list[str]:
     """Returns GitHub's annotations of the pairs that are not the same, the worst ones first, one line each."""
     differing = sorted((result for result in results if result.outcome), key=lambda result: -result.outcome)
     return [
-        f"::{'warning' if result.outcome is Outcome.WARN else 'error'} file={_property(result.path)},"
-        f"title={_property('glshade compare: ' + _word(result.outcome))}::{_data(line(result))}"
+        annotation(
+            "warning" if result.outcome is Outcome.WARN else "error",
+            printable(line(result)),
+            file=printable(result.path),
+            title=f"glshade compare: {_word(result.outcome)}",
+        )
         for result in differing[:MOST_ANNOTATIONS]
     ]
 
@@ -190,16 +195,6 @@ def _cells(metrics: Metrics | None) -> str:
 def _in_xml(text: str) -> str:
     """Returns a text as one line of characters that XML can hold. The writer of XML replaces `<`, `&` and quotes."""
     return printable(text).translate(_NOT_IN_XML)
-
-
-def _data(text: str) -> str:
-    """Returns a text as the message of a command of GitHub's workflows."""
-    return printable(text).replace("%", "%25")
-
-
-def _property(text: str) -> str:
-    """Returns a text as a property of a command of GitHub's workflows."""
-    return _data(text).replace(":", "%3A").replace(",", "%2C")
 
 
 def _markdown(text: str) -> str:

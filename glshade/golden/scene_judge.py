@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections import OrderedDict
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from threading import Lock
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from numpy.typing import NDArray
 from glshade.errors import ContextError, GlshadeError, NoReference
 from glshade.golden.result import Cause, Outcome, SceneVerdict
 from glshade.golden.rules.codes import MOST_MOVED, SHARE_MOVED, close
+from glshade.lru import Lru
 
 # The modules of the scene and of the reference are imported where they are needed: most comparisons have no scene.
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 Array = NDArray[Any]
 Flags = NDArray[np.bool_]
-Made = TypeVar("Made")
 
 # The largest share of the pixels that may differ by more than a code because drivers differ. It is the share of ambiguous
 # pixels up to which `glshade verify` decides.
@@ -81,8 +80,9 @@ class SceneJudge:
         self._overrides = tuple(overrides)
         self._backend, self._device = backend, device
         self._models, self._shaders, self._explain = models, shaders, explain
-        self._scenes: OrderedDict[Any, Any] = OrderedDict()
-        self._candidates: OrderedDict[Any, Any] = OrderedDict()
+        # The number of entries bounds them, and not their size.
+        self._scenes: Lru[Any, Scene] = Lru(0, most=KEPT)
+        self._candidates: Lru[Any, Candidates] = Lru(0, most=KEPT)
         self._at_hand: tuple[str, str, Freedom | None] | None = None
         # Folders are compared in several threads, which share the caches and the OpenGL context.
         self._lock = Lock()
@@ -251,7 +251,7 @@ class SceneJudge:
         def find() -> Candidates:
             return find_candidates(judgeable(case.scene), driver=freedom, shaders=current(paths(self._shaders)))
 
-        return _kept(self._candidates, (case.name, freedom), find)
+        return self._candidates.find((case.name, freedom), find, _unsized)
 
     def _loaded(self, reference: Origin) -> tuple[Scene, str]:
         """Returns the scene of a pair, and its name for messages. Errors: SceneError."""
@@ -263,7 +263,9 @@ class SceneJudge:
         path = self.path_for(reference)
         own = self._overrides if self.scene is not None else tuple(split(text) for text in reference.overrides)
         try:
-            scene = _kept(self._scenes, (path, own), lambda: load(Path(path), own, models=self._models, shaders=self._shaders))
+            scene = self._scenes.find(
+                (path, own), lambda: load(Path(path), own, models=self._models, shaders=self._shaders), _unsized
+            )
         except OSError as error:
             raise GlshadeError(f"{path}: the scene cannot be read: {error.strerror or error}") from None
         return scene, " ".join([path, *("=".join(pair) for pair in own)])
@@ -347,13 +349,6 @@ def _not_judged(reason: str) -> SceneFinding:
     return SceneFinding(None, notes=(f"not judged by the reference: {reason}",))
 
 
-def _kept(cache: OrderedDict[Any, Any], key: Any, make: Callable[[], Made]) -> Made:
-    """Returns what a small cache holds for a key, made if it is not there; the entry that was used longest ago is dropped."""
-    if key in cache:
-        cache.move_to_end(key)
-    else:
-        cache[key] = make()
-        if len(cache) > KEPT:
-            cache.popitem(last=False)
-    result: Made = cache[key]
-    return result
+def _unsized(_: object) -> int:
+    """Returns the size of an entry in a cache that is bounded by the number of its entries."""
+    return 0

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -46,6 +46,22 @@ class Surface:
     colour: Array | None
     footprint: tuple[Array, Array] | None = None
     level: Any = 0.0
+
+
+def mapped(surface: Surface, function: Callable[[Array], Array]) -> Surface:
+    """Returns the surface with a function applied to all arrays that have a row for each point."""
+
+    def apply(value: Any) -> Any:
+        if isinstance(value, tuple):
+            return tuple(map(apply, value))
+        return function(value) if isinstance(value, np.ndarray) and value.ndim else value
+
+    return replace(surface, **{name: apply(value) for name, value in vars(surface).items()})
+
+
+def part_of(surface: Surface, which: slice | NDArray[np.intp]) -> Surface:
+    """Returns some points of a surface."""
+    return mapped(surface, lambda value: value[which])
 
 
 def joined(surfaces: Sequence[Surface]) -> Surface:

@@ -23,7 +23,9 @@ from glshade.radiance.surface import (
     evaluate_surface,
     joined,
     light_at,
+    mapped,
     material_of,
+    part_of,
     toward_viewer,
 )
 from glshade.reference.freedom import LLVMPIPE, Freedom
@@ -323,7 +325,7 @@ def _searched(
     """
 
     def patch(which: NDArray[np.intp]) -> Iterator[Surface]:
-        part, points = fragments.take(which), _take(surface, which)
+        part, points = fragments.take(which), part_of(surface, which)
         return on_grid(draw, part, points, size, extent, GRID, inside=True)
 
     return _spread(draw, evaluate_surface, surface, errors, patch)
@@ -354,16 +356,16 @@ def _over_patches(
     if len(tiny):
         _, first, group = np.unique(2 * at[tiny] + (surface.side[tiny] > 0), return_index=True, return_inverse=True)
         part = tiny[first]
-        points = on_triangles(draw, fragments.take(part), _take(surface, part))
+        points = on_triangles(draw, fragments.take(part), part_of(surface, part))
         found = light_range(draw, points, TRIANGLE_LINES, narrowed)
         found = Range(*(getattr(found, f.name)[group.reshape(-1)] for f in fields(Range)))
-        add(tiny, _ranged(draw, _take(surface, tiny), _share(errors, tiny), found))
+        add(tiny, _ranged(draw, part_of(surface, tiny), _share(errors, tiny), found))
     if len(wide):
-        points = on_grid(draw, fragments.take(wide), _take(surface, wide), planes.size, extent, 3, inside=False)
+        points = on_grid(draw, fragments.take(wide), part_of(surface, wide), planes.size, extent, 3, inside=False)
         found = light_range(draw, points, GRID_LINES, narrowed)
-        add(wide, _ranged(draw, _take(surface, wide), _share(errors, wide), found))
+        add(wide, _ranged(draw, part_of(surface, wide), _share(errors, wide), found))
     if len(other):
-        add(other, _searched(draw, fragments.take(other), _take(surface, other), _taken(errors, other), planes.size, extent))
+        add(other, _searched(draw, fragments.take(other), part_of(surface, other), _taken(errors, other), planes.size, extent))
     return result
 
 
@@ -566,7 +568,7 @@ def over_box(
         curved |= np.linalg.norm(toward, axis=1) < CLOSE * error.max(axis=1)
     bent = np.flatnonzero(curved)
     if search and len(bent):
-        points = _take(surface, bent)
+        points = part_of(surface, bent)
         least, largest = _search(
             lambda offsets: _evaluated(draw, evaluate, (moved(points, offset) for offset in offsets)),
             error[bent],
@@ -688,17 +690,6 @@ def _levels(
     return least - driver.level, largest + driver.level
 
 
-def _take(surface: Surface, indices: NDArray[np.intp]) -> Surface:
-    """Returns the surface at the points with these indices."""
-
-    def take(value: Any) -> Any:
-        if isinstance(value, tuple):
-            return tuple(map(take, value))
-        return value[indices] if isinstance(value, np.ndarray) else value
-
-    return replace(surface, **{f.name: take(getattr(surface, f.name)) for f in fields(surface)})
-
-
 def _taken(errors: _Errors, indices: NDArray[np.intp]) -> _Errors:
     """Returns the errors at the points with these indices."""
     values = {f.name: getattr(errors, f.name) for f in fields(errors)}
@@ -732,10 +723,4 @@ def _between(samples: list[Array]) -> Array:
 
 def narrowed(surface: Surface) -> Surface:
     """Returns the surface with all attributes rounded to float32."""
-
-    def narrow(value: Any) -> Any:
-        if isinstance(value, tuple):
-            return tuple(map(narrow, value))
-        return value.astype(np.float32) if isinstance(value, np.ndarray) else value
-
-    return replace(surface, **{f.name: narrow(getattr(surface, f.name)) for f in fields(surface)})
+    return mapped(surface, lambda value: value.astype(np.float32))

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.spirv.arithmetic import NEAREST, ULP, Arithmetic
-from glshade.spirv.operations import DIVISION, Operation, dot
+from glshade.spirv.operations import DIVISION, Operation, dot, exact, rounded
 
 Array = NDArray[Any]
 
@@ -29,18 +29,6 @@ EXP, EXP_GROWTH = 3.0, 2.0
 TRIGONOMETRY, TRIGONOMETRY_NEAR_ZERO = 4.0, 2.0**-21
 # The same for the inverse functions: 4096 ulps of a result near 1.
 INVERSE, INVERSE_NEAR_ZERO = 4096.0, 2.0**-11
-
-
-def _same(function: Callable[..., Array]) -> Operation:
-    """Returns a function without rounding error, for operands of one shape."""
-    return lambda arithmetic, line, *operands: function(*operands)
-
-
-def _rounded(function: Callable[..., Array], ulps: float | None = None) -> Operation:
-    """Returns a function of floats with an error in ulps."""
-    if ulps is None:
-        return lambda arithmetic, line, *operands: arithmetic.rounded(function(*operands), line)
-    return lambda arithmetic, line, *operands: arithmetic.rounded(function(*operands), line, ulps)
 
 
 def _with_floor(function: Callable[..., Array], ulps: float, floor: float) -> Operation:
@@ -191,54 +179,54 @@ def _fraction(x: Array) -> Array:
 
 
 FUNCTIONS: dict[int, Operation] = {
-    1: _same(np.rint),  # Round: which of two integers a half becomes is left open
-    2: _same(np.rint),  # RoundEven
-    3: _same(np.trunc),
-    4: _same(np.abs),  # FAbs
-    5: _same(np.abs),  # SAbs
-    6: _same(np.sign),  # FSign
-    7: _same(np.sign),  # SSign
-    8: _same(np.floor),
-    9: _same(np.ceil),
-    10: _rounded(_fraction),
-    11: _rounded(np.radians),
-    12: _rounded(np.degrees),
+    1: exact(np.rint),  # Round: which of two integers a half becomes is left open
+    2: exact(np.rint),  # RoundEven
+    3: exact(np.trunc),
+    4: exact(np.abs),  # FAbs
+    5: exact(np.abs),  # SAbs
+    6: exact(np.sign),  # FSign
+    7: exact(np.sign),  # SSign
+    8: exact(np.floor),
+    9: exact(np.ceil),
+    10: rounded(_fraction),
+    11: rounded(np.radians),
+    12: rounded(np.degrees),
     13: _with_floor(np.sin, TRIGONOMETRY, TRIGONOMETRY_NEAR_ZERO),
     14: _with_floor(np.cos, TRIGONOMETRY, TRIGONOMETRY_NEAR_ZERO),
-    15: _rounded(np.tan, 2 * TRIGONOMETRY),
+    15: rounded(np.tan, 2 * TRIGONOMETRY),
     16: _with_floor(np.arcsin, INVERSE, INVERSE_NEAR_ZERO),
     17: _with_floor(np.arccos, INVERSE, INVERSE_NEAR_ZERO),
-    18: _rounded(np.arctan, INVERSE),
-    19: _rounded(np.sinh, TRIGONOMETRY),
-    20: _rounded(np.cosh, TRIGONOMETRY),
-    21: _rounded(np.tanh, TRIGONOMETRY),
-    22: _rounded(np.arcsinh, TRIGONOMETRY),
-    23: _rounded(np.arccosh, TRIGONOMETRY),
-    24: _rounded(np.arctanh, TRIGONOMETRY),
-    25: _rounded(np.arctan2, INVERSE),
+    18: rounded(np.arctan, INVERSE),
+    19: rounded(np.sinh, TRIGONOMETRY),
+    20: rounded(np.cosh, TRIGONOMETRY),
+    21: rounded(np.tanh, TRIGONOMETRY),
+    22: rounded(np.arcsinh, TRIGONOMETRY),
+    23: rounded(np.arccosh, TRIGONOMETRY),
+    24: rounded(np.arctanh, TRIGONOMETRY),
+    25: rounded(np.arctan2, INVERSE),
     26: _power,
     27: _exponential(np.exp),
     28: _logarithm(np.log, float(np.log(2))),
     29: _exponential(np.exp2),
     30: _logarithm(np.log2, 1.0),
-    31: _rounded(np.sqrt, SQRT),
-    32: _rounded(lambda x: 1 / np.sqrt(x), INVERSE_SQRT),
+    31: rounded(np.sqrt, SQRT),
+    32: rounded(lambda x: 1 / np.sqrt(x), INVERSE_SQRT),
     33: _determinant,
     34: _inverse,
-    37: _same(_smaller),  # FMin
-    38: _same(np.minimum),  # UMin
-    39: _same(np.minimum),  # SMin
-    40: _same(_larger),  # FMax
-    41: _same(np.maximum),  # UMax
-    42: _same(np.maximum),  # SMax
-    43: _same(_clamped),  # FClamp
-    44: _same(_clamped),  # UClamp
-    45: _same(_clamped),  # SClamp
+    37: exact(_smaller),  # FMin
+    38: exact(np.minimum),  # UMin
+    39: exact(np.minimum),  # SMin
+    40: exact(_larger),  # FMax
+    41: exact(np.maximum),  # UMax
+    42: exact(np.maximum),  # SMax
+    43: exact(_clamped),  # FClamp
+    44: exact(_clamped),  # UClamp
+    45: exact(_clamped),  # SClamp
     46: _mix,
-    48: _same(lambda edge, x: np.where(x < edge, 0.0, 1.0)),
+    48: exact(lambda edge, x: np.where(x < edge, 0.0, 1.0)),
     49: _smoothstep,
     50: _fma,
-    53: _same(lambda x, exponent: np.ldexp(x, exponent)),
+    53: exact(lambda x, exponent: np.ldexp(x, exponent)),
     66: _length,
     67: _distance,
     68: _cross,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.spirv.arithmetic import Arithmetic
+from glshade.spirv.arithmetic import NEAREST, Arithmetic
 from glshade.spirv.values import stacked
 
 Array = NDArray[Any]
@@ -37,14 +37,12 @@ def dot(arithmetic: Arithmetic, line: int, a: Array, b: Array) -> Array:
     return total(arithmetic, line, arithmetic.rounded(a * b, line))
 
 
-def _rounded(function: Callable[..., Array], ulps: float | None = None) -> Operation:
-    """Returns an operation on floats whose result is rounded. ulps: its largest error, where it is not rounded to nearest."""
-    if ulps is None:
-        return lambda arithmetic, line, *operands: arithmetic.rounded(function(*operands), line)
+def rounded(function: Callable[..., Array], ulps: float = NEAREST) -> Operation:
+    """Returns an operation on floats whose result is rounded. ulps: its largest error; by default, it is rounded to nearest."""
     return lambda arithmetic, line, *operands: arithmetic.rounded(function(*operands), line, ulps)
 
 
-def _exact(function: Callable[..., Array]) -> Operation:
+def exact(function: Callable[..., Array]) -> Operation:
     """Returns an operation that has no rounding error."""
     return lambda arithmetic, line, *operands: function(*operands)
 
@@ -97,27 +95,27 @@ def _modulus(a: Array, b: Array) -> Array:
 
 def _signed(function: Callable[..., Array], dtype: type[Any]) -> Operation:
     """Returns an operation on integers that takes its operands as signed (int32) or unsigned (uint32)."""
-    return _exact(lambda *operands: function(*(operand.view(dtype) for operand in operands)))
+    return exact(lambda *operands: function(*(operand.view(dtype) for operand in operands)))
 
 
 def _shifted(function: Callable[..., Array], dtype: type[Any]) -> Operation:
     """Returns a shift. A shift by 32 bits or more is undefined, so the amount is taken modulo 32."""
-    return _exact(lambda a, b: function(a.view(dtype), (b.view(np.uint32) & np.uint32(31)).astype(dtype)).view(a.dtype))
+    return exact(lambda a, b: function(a.view(dtype), (b.view(np.uint32) & np.uint32(31)).astype(dtype)).view(a.dtype))
 
 
 _INTEGERS: dict[str, Operation] = {
-    "SNegate": _exact(np.negative),
-    "IAdd": _exact(np.add),
-    "ISub": _exact(np.subtract),
-    "IMul": _exact(np.multiply),
+    "SNegate": exact(np.negative),
+    "IAdd": exact(np.add),
+    "ISub": exact(np.subtract),
+    "IMul": exact(np.multiply),
     "UDiv": _signed(_divided, np.uint32),
     "SDiv": _signed(_divided, np.int32),
     "UMod": _signed(_remainder, np.uint32),
     "SMod": _signed(_modulus, np.int32),
-    "BitwiseOr": _exact(np.bitwise_or),
-    "BitwiseXor": _exact(np.bitwise_xor),
-    "BitwiseAnd": _exact(np.bitwise_and),
-    "Not": _exact(np.bitwise_not),
+    "BitwiseOr": exact(np.bitwise_or),
+    "BitwiseXor": exact(np.bitwise_xor),
+    "BitwiseAnd": exact(np.bitwise_and),
+    "Not": exact(np.bitwise_not),
     "ShiftRightLogical": _shifted(np.right_shift, np.uint32),
     "ShiftRightArithmetic": _shifted(np.right_shift, np.int32),
     "ShiftLeftLogical": _shifted(np.left_shift, np.uint32),
@@ -131,49 +129,49 @@ _COMPARISONS: Mapping[str, Callable[..., Any]] = {
     "GreaterThanEqual": np.greater_equal,
 }
 _LOGIC: dict[str, Operation] = {
-    "LogicalEqual": _exact(np.equal),
-    "LogicalNotEqual": _exact(np.not_equal),
-    "LogicalOr": _exact(np.logical_or),
-    "LogicalAnd": _exact(np.logical_and),
-    "LogicalNot": _exact(np.logical_not),
-    "Any": _exact(lambda a: a.any(axis=0)),
-    "All": _exact(lambda a: a.all(axis=0)),
-    "IsNan": _exact(np.isnan),
-    "IsInf": _exact(np.isinf),
+    "LogicalEqual": exact(np.equal),
+    "LogicalNotEqual": exact(np.not_equal),
+    "LogicalOr": exact(np.logical_or),
+    "LogicalAnd": exact(np.logical_and),
+    "LogicalNot": exact(np.logical_not),
+    "Any": exact(lambda a: a.any(axis=0)),
+    "All": exact(lambda a: a.all(axis=0)),
+    "IsNan": exact(np.isnan),
+    "IsInf": exact(np.isinf),
 }
 _FLOATS: dict[str, Operation] = {
-    "FNegate": _exact(np.negative),
-    "FAdd": _rounded(np.add),
-    "FSub": _rounded(np.subtract),
-    "FMul": _rounded(np.multiply),
-    "FDiv": _rounded(np.divide, DIVISION),
-    "FMod": _rounded(lambda a, b: a - b * np.floor(a / b), DIVISION),
-    "VectorTimesScalar": _rounded(np.multiply),
-    "MatrixTimesScalar": _rounded(np.multiply),
+    "FNegate": exact(np.negative),
+    "FAdd": rounded(np.add),
+    "FSub": rounded(np.subtract),
+    "FMul": rounded(np.multiply),
+    "FDiv": rounded(np.divide, DIVISION),
+    "FMod": rounded(lambda a, b: a - b * np.floor(a / b), DIVISION),
+    "VectorTimesScalar": rounded(np.multiply),
+    "MatrixTimesScalar": rounded(np.multiply),
     "MatrixTimesVector": _matrix_times_vector,
     "VectorTimesMatrix": _vector_times_matrix,
     "MatrixTimesMatrix": _matrix_times_matrix,
     "OuterProduct": lambda arithmetic, line, a, b: arithmetic.rounded(a[None] * b[:, None], line),
     "Dot": dot,
-    "Transpose": _exact(lambda a: np.swapaxes(a, 0, 1)),
-    "ConvertFToS": _exact(_to_int),
-    "ConvertFToU": _exact(_to_uint),
+    "Transpose": exact(lambda a: np.swapaxes(a, 0, 1)),
+    "ConvertFToS": exact(_to_int),
+    "ConvertFToU": exact(_to_uint),
     # float32 does not hold all integers above 2^24, so the result is rounded.
     "ConvertSToF": lambda arithmetic, line, a: a.astype(np.float32).astype(arithmetic.dtype),
     "ConvertUToF": lambda arithmetic, line, a: a.astype(np.float32).astype(arithmetic.dtype),
     # The condition may be a scalar for vectors too; lanes are the last axis either way.
-    "Select": _exact(np.where),
+    "Select": exact(np.where),
 }
 OPERATIONS: dict[str, Operation] = {
     **_INTEGERS,
     **_LOGIC,
     **_FLOATS,
-    **{f"FOrd{name}": _exact(function) for name, function in _COMPARISONS.items() if name != "NotEqual"},
+    **{f"FOrd{name}": exact(function) for name, function in _COMPARISONS.items() if name != "NotEqual"},
     # "Ordered and not equal" is False where an operand is NaN, unlike NumPy's comparison.
-    "FOrdNotEqual": _exact(lambda a, b: (a < b) | (a > b)),
-    "FUnordNotEqual": _exact(np.not_equal),
+    "FOrdNotEqual": exact(lambda a, b: (a < b) | (a > b)),
+    "FUnordNotEqual": exact(np.not_equal),
     **{f"S{name}": _signed(function, np.int32) for name, function in _COMPARISONS.items() if "Than" in name},
     **{f"U{name}": _signed(function, np.uint32) for name, function in _COMPARISONS.items() if "Than" in name},
-    "IEqual": _exact(np.equal),
-    "INotEqual": _exact(np.not_equal),
+    "IEqual": exact(np.equal),
+    "INotEqual": exact(np.not_equal),
 }

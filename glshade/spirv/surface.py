@@ -20,7 +20,7 @@ from glshade.glsl.uniforms import ambient_radiance, light_pages, light_uniforms,
 from glshade.lights import LIGHTS
 from glshade.radiance.draw import Draw, wide
 from glshade.radiance.sampler import Sampler
-from glshade.radiance.surface import Surface
+from glshade.radiance.surface import Surface, mapped, part_of
 from glshade.scene.scene import Scene
 from glshade.spirv.arithmetic import FLOAT64, Arithmetic, RandomRounding
 from glshade.spirv.compiler import compiled
@@ -132,7 +132,7 @@ class SurfaceText:
         if surface.position.dtype != np.float32:
             return exact
         # All runs are lanes of one run, which saves time for small surfaces.
-        repeated = _mapped(_wide(surface), lambda value: np.concatenate([value] * RUNS))
+        repeated = mapped(_wide(surface), lambda value: np.concatenate([value] * RUNS))
         shape = (RUNS, *exact.shape)
         rounding = (RandomRounding(scale=scale, on_grid=True) for scale in (1.0, LARGER))
         errors = [self._sum(repeated, arithmetic).reshape(shape) - exact for arithmetic in rounding]
@@ -270,20 +270,4 @@ class _Picture:
 
 def _wide(surface: Surface) -> Surface:
     """Returns the surface with float64 numbers."""
-    return _mapped(surface, lambda value: value.astype(np.float64))
-
-
-def part_of(surface: Surface, which: slice | NDArray[np.intp]) -> Surface:
-    """Returns some points of a surface."""
-    return _mapped(surface, lambda value: value[which])
-
-
-def _mapped(surface: Surface, function: Any) -> Surface:
-    """Returns the surface with a function applied to all arrays with a row for each point."""
-
-    def apply(value: Any) -> Any:
-        if isinstance(value, tuple):
-            return tuple(map(apply, value))
-        return function(value) if isinstance(value, np.ndarray) and value.ndim else value
-
-    return replace(surface, **{name: apply(value) for name, value in vars(surface).items()})
+    return mapped(surface, lambda value: value.astype(np.float64))

@@ -7,7 +7,7 @@ one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -156,8 +156,3 @@ def left(value: Value, lanes: int) -> Any:
         return tuple(left(member, lanes) for member in value)
     array = np.moveaxis(np.broadcast_to(value, (*value.shape[:-1], lanes)), -1, 0)
     return np.swapaxes(array, -1, -2) if array.ndim > 2 else array
-
-
-def apply(function: Callable[[Array], Array], value: Value) -> Value:
-    """Returns a function's results for all arrays of a value."""
-    return tuple(apply(function, member) for member in value) if isinstance(value, tuple) else function(value)

@@ -16,15 +16,15 @@ from glshade.glsl.shaders import Shaders, current
 from glshade.glsl.source import Stage
 from glshade.radiance.draw import Draw
 from glshade.radiance.readying import ready
-from glshade.radiance.surface import Surface, evaluate_surface
-from glshade.reference.bounds import narrowed
+from glshade.radiance.surface import Surface, evaluate_surface, part_of
+from glshade.reference.bounds import AGAIN, narrowed
 from glshade.reference.inputs import Inputs
 from glshade.reference.visible import visible_parts
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
 from glshade.spirv.arithmetic import FLOAT64
 from glshade.spirv.compiler import compiled
-from glshade.spirv.surface import SurfaceText, part_of, surface_text
+from glshade.spirv.surface import SurfaceText, surface_text
 
 Array = NDArray[Any]
 
@@ -32,8 +32,6 @@ Array = NDArray[Any]
 POINTS = 2048
 # The difference that is allowed between them, relative to the brightest point: the constants in the GLSL are float32 numbers.
 ALLOWED = 1e-5
-# Rounding explains a difference of this many times the largest change that random rounding makes.
-AGAIN = 4.0
 
 
 def with_text(scene: Scene, inputs: Inputs, shading: Rate | None, every: bool, shaders: Shaders | None) -> Inputs:

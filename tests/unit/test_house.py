@@ -22,7 +22,7 @@ ROOMS = (
     *("golden", "live", "batch", "bench", "cli"),
 )
 # Modules of no room, which every room may import. They import no room.
-BASE = {"errors", "found", "document", "files", "limits", "arrays", "version", "lru", "problem"}
+BASE = {"errors", "found", "document", "files", "limits", "arrays", "version", "lru", "problem", "github"}
 # `python -m glshade` runs the command line.
 ENTRIES = {"", "__main__"}
 # docs/tradeoff.md names glshade.tradeoff.study.study, and what is documented keeps its name.

@@ -78,7 +78,7 @@ TEXTURED = {"texture": f"../{TEXTURE}"}
 
 @scene
 def rates() -> Document:
-    """Three models at three shading rates, on coarse spheres, with four samples."""
+    """Returns a scene with three models at three shading rates, on coarse spheres, with four samples."""
     materials: Document = {
         "matte": {"brdf": "lambert", "kd": [0.8, 0.33, 0.15]},
         "shiny": {"brdf": "phong", "kd": [0.62, 0.05, 0.07], "ks": 0.65, "exponent": 24},
@@ -95,7 +95,7 @@ def rates() -> Document:
 
 @scene
 def textured() -> Document:
-    """A textured floor in perspective, whose mipmaps show, and a sphere with bumps; one sample."""
+    """Returns a scene with a textured floor in perspective, whose mipmaps show, and a sphere with bumps; one sample."""
     objects = [
         _thing({"type": "plane", "segments": 8}, (0, -1, -4), "floor", transform={"scale": [4, 1, 8]}),
         _thing(_ball(), (-0.8, 0, 0), "bumpy"),
@@ -118,7 +118,7 @@ def textured() -> Document:
 
 @scene
 def falloffs() -> Document:
-    """Spheres beside point lights with each falloff, with four samples."""
+    """Returns a scene with spheres beside point lights with each falloff, with four samples."""
     objects = [_thing(_ball(), (2.3 * x, -2.3 * y, 0), "chalk", name=f"ball{x}{y}") for y in range(3) for x in range(4)]
     lights: list[Document] = [
         {
@@ -138,7 +138,7 @@ def falloffs() -> Document:
 
 @scene
 def brushed() -> Document:
-    """Anisotropic highlights on a sphere, a cylinder and a torus, with four samples."""
+    """Returns a scene with anisotropic highlights on a sphere, a cylinder and a torus, with four samples."""
     model = {"brdf": "ashikhmin_shirley", "kd": [0.3, 0.2, 0.13], "ks": [0.8, 0.62, 0.45]}
     materials = {"along": {**model, "pu": 300, "pv": 8}, "across": {**model, "pu": 8, "pv": 300}}
     objects = [
@@ -153,7 +153,7 @@ def brushed() -> Document:
 
 @scene
 def spots() -> Document:
-    """A red, a green and a blue spot light on a wall in perspective; one sample."""
+    """Returns a scene with a red, a green and a blue spot light on a wall in perspective; one sample."""
     places = ((0, 0.85, (1, 0, 0)), (-0.8, -0.5, (0, 1, 0)), (0.8, -0.5, (0, 0, 1)))
     lights: list[Document] = [
         {
@@ -182,7 +182,7 @@ def spots() -> Document:
 
 @scene
 def metals() -> Document:
-    """Six presets under three lights, supersampled."""
+    """Returns a scene with six presets under three lights, supersampled."""
     names = ("gold", "copper", "brushed_steel", "red_plastic", "car_paint", "satin")
     objects = [_thing(_ball(), (2.25 * (i % 3), -2.25 * (i // 3), 0), name) for i, name in enumerate(names)]
     rim = {"type": "directional", "name": "rim", "direction": [-0.45, -0.8, 0.55], "intensity": 0.3}
@@ -192,7 +192,7 @@ def metals() -> Document:
 
 @scene
 def solids() -> Document:
-    """Solids that cut through each other, per vertex, over a background with alpha; one sample."""
+    """Returns a scene with solids that cut through each other, per vertex, over a background with alpha; one sample."""
     objects = [
         _thing("cube", (-0.6, 0, 0), "red", transform={"rotate": [20, 30, 0]}, shading="gouraud"),
         _thing({"type": "cone", "segments": 48}, (0.5, 0.1, 0.3), "green", transform={"rotate": [0, 0, -20]}),
@@ -216,7 +216,7 @@ def solids() -> Document:
 
 @scene
 def cut_out() -> Document:
-    """A leaf that is cut out by its texture's alpha before a sphere, behind a pane of coloured glass; one sample, floats."""
+    """Returns a scene with a leaf, cut out by alpha, before a sphere and behind coloured glass; one sample, floats."""
     objects = [
         _thing(_ball(), (0, 0, -1), "ball"),
         _thing("plane", (-0.6, 0, 0.6), "leaf", transform={"rotate": [80, 15, 0]}, sides="both"),
@@ -233,7 +233,7 @@ def cut_out() -> Document:
 
 @scene
 def near() -> Document:
-    """A camera so near to coarse shapes that they cross the picture's border, with values above 1; four samples, floats."""
+    """Returns a scene with coarse shapes that cross the picture's border, and values above 1; four samples, floats."""
     objects = [
         _thing({"type": "icosphere", "subdivisions": 2}, (-0.9, 0.2, 0), "bright", shading="flat"),
         _thing({"type": "icosphere", "subdivisions": 3}, (1.2, -0.3, -0.6), "dull"),
@@ -250,7 +250,7 @@ def near() -> Document:
 
 @scene
 def crowd() -> Document:
-    """Forty spheres of a few pixels each, whose outlines are a large share of the picture; one sample."""
+    """Returns a scene with forty spheres of a few pixels each, whose outlines are a large share of the picture; one sample."""
     objects = [
         _thing(
             {"type": "icosphere", "subdivisions": 2},

@@ -63,7 +63,7 @@ class Request:
 
 
 def _rule(given: object) -> Rule | None:
-    """Returns the rule that a test names, or has made. Errors: GlshadeError where there is no such rule."""
+    """Returns a test's rule, given by its name or as a Rule. Errors: GlshadeError where no rule has the name."""
     if given is None or isinstance(given, Rule):
         return given
     if isinstance(given, str) and given in RULES:
