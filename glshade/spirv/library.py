@@ -105,12 +105,13 @@ def _cross(arithmetic: Arithmetic, line: int, a: Array, b: Array) -> Array:
 def _mix(arithmetic: Arithmetic, line: int, x: Array, y: Array, a: Array) -> Array:
     """Returns x (1 - a) + y a, the form of the specification.
 
-    Many drivers compute x + a (y - x), whose error is relative to the larger of x and y.
+    Many drivers compute x + a (y - x). Rounding the difference and the product adds an error relative to a (y - x), which may be
+    much larger than the result.
     """
     first = arithmetic.rounded(x * arithmetic.rounded(1 - a, line), line)
     result = first + arithmetic.rounded(y * a, line)
-    larger = ULP * np.maximum(np.abs(x), np.abs(y))
-    return arithmetic.rounded(result, line, np.maximum(NEAREST, _in_ulps(larger, result)))
+    other = ULP * np.abs(a * (y - x))
+    return arithmetic.rounded(result, line, np.maximum(NEAREST, _in_ulps(other, result)))
 
 
 def _smoothstep(arithmetic: Arithmetic, line: int, low: Array, high: Array, x: Array) -> Array:

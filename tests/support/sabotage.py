@@ -334,7 +334,7 @@ SABOTAGES: tuple[Sabotage, ...] = (
     Sabotage("principled: subsurface", "principled", "1.25 * INV_PI", "1.250625 * INV_PI"),
     Sabotage("principled: sheen", "principled", "m.sheen * fh", "1.0005 * m.sheen * fh"),
     Sabotage("principled: F0 of the clear coat", "principled", "0.04 + 0.96 * fh", "0.0404 + 0.9596 * fh"),
-    Sabotage("principled: roughness of the clear coat", "principled", "0.1 * (1.0 - gloss)", "0.1001 * (1.0 - gloss)"),
+    Sabotage("principled: roughness of the clear coat", "principled", "0.099 * (1.0 - gloss)", "0.0991 * (1.0 - gloss)"),
     Sabotage("principled: width of G", "principled", "0.5 + 0.5 * roughness", "0.5 + 0.501 * roughness"),
     Sabotage("principled: anisotropy", "principled anisotropic", "0.9 * anisotropy", "0.8995 * anisotropy"),
     Sabotage("retro_ggx: direction", "retro_ggx", "2.0 * NoL * f.n - l", "2.001 * NoL * f.n - l"),
