@@ -7,7 +7,7 @@ from contextlib import AsyncExitStack
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from time import perf_counter
+from time import perf_counter, time
 from typing import Any
 
 from glshade.image.file import check_suffix
@@ -73,10 +73,10 @@ async def redraw(
 
 async def _redrawn(child: Child, watcher: Watcher, load: Load, output: str) -> Redrawn:
     """Loads a scene and writes its picture."""
-    start = perf_counter()
+    start, began = perf_counter(), time()
     try:
         answer = await _loaded(child, load)
-        watcher.watch([*answer.dependencies, *answer.folders])
+        watcher.watch([*answer.dependencies, *answer.folders], since=began)
         last: Answer = answer
         if answer.ok:
             last = await child.ask(Save(path=str(Path(output).absolute())))

@@ -253,11 +253,12 @@ class Session:
             models=settings.models,
             size=settings.size,
         )
+        began = time.time()
         answer = await self._supervisor.load(request)
         if isinstance(answer, Loaded):
             self._problems = answer.problems
             self._milliseconds = {"watch": watched, **answer.milliseconds}
-            self._watcher.watch([*answer.dependencies, *answer.folders])
+            self._watcher.watch([*answer.dependencies, *answer.folders], since=began)
         elif isinstance(answer, Failed):
             self._problems = answer.problems
         # A picture of the reference that was cancelled is asked for again, also where the new revision has a fault.

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import asyncio
 import hashlib
+import math
 import os
 import time
 from collections.abc import AsyncIterator, Iterable
@@ -60,15 +61,22 @@ class Watcher:
         self._settled: dict[Path, tuple[Stamp, State]] = {}
         self._restart = asyncio.Event()
 
-    def watch(self, paths: Iterable[str | Path]) -> None:
+    def watch(self, paths: Iterable[str | Path], since: float = math.inf) -> None:
         """Replaces the files and folders that are watched.
 
         The state of a path that was watched before stays known, so that no change is missed or told twice.
+
+        since: the time at which the caller began to read the files [seconds since the epoch]. A path that was not watched
+            before counts as changed if it was written later. Default: what lies there now is known to the caller.
         """
         wanted = frozenset(Path(os.path.abspath(path)) for path in paths)
         if wanted != self.paths:
             self.paths = wanted
-            self._known = {path: self._known[path] if path in self._known else self._state(path) for path in self._files()}
+            known = self._known
+            self._known = {}
+            for path in self._files():
+                is_doubtful = path not in known and _written(path) > since - RECENT
+                self._known[path] = UNKNOWN if is_doubtful else known[path] if path in known else self._state(path)
             self._restart.set()
 
     async def changes(self) -> AsyncIterator[frozenset[Path]]:
@@ -94,16 +102,24 @@ class Watcher:
                 yield_on_timeout=True,
                 ignore_permission_denied=True,
             )
+            # A path that was doubtful when it was first watched has changed already, and no message comes for it.
+            async for changed in self._told():
+                yield changed
             with suppress(FileNotFoundError):  # a folder has vanished since it was listed
                 async for events in messages:
-                    while changed := await self._changed():
-                        before = self._stamps()
+                    async for changed in self._told():
                         yield changed
-                        self._doubt(before)
                     # A folder that was replaced is another folder, whose messages have to be asked for again.
                     if _places(self.paths) != places or any(Path(path) in places for _, path in events):
                         break
             await messages.aclose()
+
+    async def _told(self) -> AsyncIterator[frozenset[Path]]:
+        """Yields the files that have changed until nothing has changed while the caller read them."""
+        while changed := await self._changed():
+            before = self._stamps()
+            yield changed
+            self._doubt(before)
 
     async def _changed(self) -> frozenset[Path]:
         """Returns the files that differ from their known states, when two readings agree; their states are then known."""
@@ -175,6 +191,22 @@ def _in_folder(folder: Path) -> set[Path]:
     except OSError:
         return set()
     return {path for path in named if path.suffix in SUFFIXES or path.is_dir()}
+
+
+def _written(path: Path) -> float:
+    """Returns the time at which a path last changed: its file, or a symbolic link to it [seconds since the epoch].
+
+    For a missing path it is the time at which its folder changed. The time is that of the inode's last change, because a file
+    that is renamed keeps the time at which its content was written.
+    """
+    try:
+        return max(path.stat().st_ctime, path.lstat().st_ctime)
+    except (OSError, ValueError):
+        pass
+    try:
+        return path.parent.stat().st_ctime
+    except (OSError, ValueError):
+        return 0.0
 
 
 def _stamp(path: Path) -> Stamp | None:

@@ -141,6 +141,27 @@ def test_a_new_shader_and_a_file_that_appears_are_changes(tmp_path: Path) -> Non
     asyncio.run(play())
 
 
+@pytest.mark.parametrize("save", STYLES)
+def test_a_file_that_changes_before_it_is_first_watched_is_a_change(save: Callable[[Path, str], None], tmp_path: Path) -> None:
+    """The caller has read a file, learns from it which others to watch, and one of them has changed meanwhile."""
+    scene, shader, quiet = (tmp_path / name / "file" for name in ("scene", "shader", "quiet"))
+    for path in (scene, shader, quiet):
+        path.parent.mkdir()
+        path.write_text("first")
+
+    async def play() -> None:
+        async with watching(scene) as (watcher, following):
+            await asyncio.sleep(2 * watching_files.RECENT)
+            began = time.time()
+            save(shader, "second")
+            watcher.watch([scene, shader, quiet], since=began)
+            assert await following() == {shader}
+            save(shader, "third")
+            assert await following() == {shader}
+
+    asyncio.run(play())
+
+
 def test_half_a_file_is_not_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A file that is written in many pieces counts when it has come to rest."""
     # On a busy machine the pieces come late.
