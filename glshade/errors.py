@@ -77,6 +77,10 @@ class AssetError(SceneError):
     """A mesh or a texture cannot be read, or has no content that can be drawn."""
 
 
+class AssetWarning(UserWarning):
+    """A mesh is drawn without something that it names or holds: a file that is missing, or values that are not numbers."""
+
+
 class ShaderError(GlshadeError):
     """The driver or the include resolver refused a shader. Each line of the message reads `file:line:column: message`.
 

@@ -26,8 +26,8 @@ LONGEST_CHAIN = 256
 MOST_INSTANCES = 100_000
 # The pixels that a texture may have for each byte of its file, if it has more than `max_texels`. A photograph has about 5.
 TEXELS_PER_BYTE = 16
-# The corners of a polygon that is not convex. The time to cut it into triangles grows with their square or faster.
-MOST_CORNERS = 1000
+# The corners of a polygon that is not convex. The time to cut it into triangles grows with their square, to some seconds here.
+MOST_CORNERS = 10_000
 # The files of materials that an OBJ file may name.
 MOST_LIBRARIES = 1000
 # The faults that a message lists.

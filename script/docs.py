@@ -21,7 +21,7 @@ from glshade.scene.object import Object, Transform
 from glshade.scene.quality import Quality
 from glshade.scene.scene import Scene
 from glshade.scene.shape import SHAPES
-from glshade.textures.texture import BumpMap, DirectionMap, NormalMap, Texture
+from glshade.textures.texture import BumpMap, DirectionMap, NormalMap, OcclusionMap, Texture
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGE = ROOT / "docs" / "scene-file.md"
@@ -77,6 +77,7 @@ TABLES = {
     "NormalMap": "[normal map](#normal-maps)",
     "BumpMap": "[bump map](#bump-maps)",
     "DirectionMap": "[direction map](#direction-maps)",
+    "OcclusionMap": "[occlusion map](#occlusion-maps)",
 }
 SAID = {
     ("Scene", "film"): "size, samples, background and encoding of the picture",
@@ -97,8 +98,8 @@ def kind(schema: Mapping[str, Any]) -> str:
     options = [option for option in schema.get("anyOf", schema.get("oneOf", ())) if option.get("type") != "null"]
     if options:
         words = [kind(option) for option in options]
-        if words[:2] == ["number", "3 numbers"]:
-            words[:2] = ["3 numbers or 1"]
+        if words[0] == "number" and words[1:2] in (["2 numbers"], ["3 numbers"]):
+            words[:2] = [f"{words[1]} or 1"]
         return ", or ".join(words)
     form = schema.get("type")
     if form == "array":
@@ -202,6 +203,7 @@ def scene_file() -> str:
         text += f"\nSource: {BRDFS[name].source}.\n"
     text += section(3, "Textures", Texture) + section(3, "Normal maps", NormalMap)
     text += section(3, "Bump maps", BumpMap) + section(3, "Direction maps", DirectionMap)
+    text += section(3, "Occlusion maps", OcclusionMap)
     text += section(2, "Lights", Light)
     for name in LIGHTS:
         text += section(3, f"`{name}`", LIGHTS[name], Light)

@@ -6,6 +6,7 @@ Both renderers start from an Assembly. Its meshes are float32; everything else i
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,19 +21,25 @@ from pydantic import ValidationError
 from glshade.assembly.counting import check_counts, check_texels
 from glshade.assembly.default_rig import rig
 from glshade.assembly.instance import Instance
+from glshade.assembly.strokes import Viewport, stroked
 from glshade.brdfs import BRDFS, Brdf
-from glshade.errors import SceneError
-from glshade.lights import Light
+from glshade.errors import AssetWarning, SceneError
+from glshade.lights import LIGHTS, Light
 from glshade.limits import LARGEST_NUMBER, SMALLEST_NUMBER
 from glshade.mesh.facets import faceted
 from glshade.mesh.mesh import Mesh
 from glshade.mesh.model import MeshPart, Model
 from glshade.mesh.normals import with_normals
 from glshade.mesh.order import ordered
-from glshade.mesh.tangents import with_tangents
+from glshade.mesh.reading.textures import plain
+from glshade.mesh.tangents import OWN_AXES, Axes, with_tangents
+from glshade.mesh.winding import turned_over
 from glshade.scene.camera import View
 from glshade.scene.object import Normals, Object, Rate
+from glshade.scene.of_files import file_lights, placed
+from glshade.scene.of_files import world as world_of
 from glshade.scene.scene import Scene
+from glshade.textures.texture import Picture
 
 Array = NDArray[np.float64]
 
@@ -45,6 +52,8 @@ SMALLEST, LARGEST = 1e-12, 1e12
 # The material of an object that has none, and its name in messages.
 DEFAULT_NAME = "default"
 DEFAULT_MATERIAL: Brdf = BRDFS["phong"].model_validate({"kd": 0.6, "ks": 0.25, "exponent": 50.0})
+# The light under which a material of `own_colour` shows exactly its base colour.
+WHITE: Light = LIGHTS["ambient"].model_validate({"intensity": 1.0, "name": "unlit"})
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,15 +61,17 @@ class Assembly:
     """A scene with everything looked up.
 
     instances: the instances, in the order of the scene's objects.
-    lights: the scene's lights, or the default rig where the scene lists none.
+    lights: the scene's lights, or the default rig where the scene lists none; with unlit materials, also `WHITE` at the end.
     view: the camera at its final position.
     unit: the factor of all lengths. It differs from 1 only if the squares of lengths would leave the range of float32.
+    own_light: index of the light that shows the base colours of unlit materials; None if no material is unlit.
     """
 
     instances: tuple[Instance, ...]
     lights: tuple[Light, ...]
     view: View
     unit: float = 1.0
+    own_light: int | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +103,8 @@ class _Piece:
         return _placed(self.mesh.bounds[upper, np.arange(3)], self.world)
 
     def points(self) -> Array:
-        """Returns the positions of the vertices (V, 3), in world space."""
-        return _placed(self.mesh.positions + self.mesh.origin, self.world)
+        """Returns the positions of the vertices in use (U, 3), in world space."""
+        return _placed(self.mesh.drawn + self.mesh.origin, self.world)
 
 
 def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
@@ -105,14 +116,18 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
     pieces = _pieces(scene, shading)
     check_texels((piece.material for piece in pieces), scene.limits)
     view = _view(scene, pieces)
-    lights = scene.lights if scene.lights is not None else rig(view)
+    own = file_lights(scene, scene.loader())
+    # The lights of mesh files replace the default rig, and join the lights that the scene lists.
+    lights = (*(scene.lights or ()), *own) if own or scene.lights is not None else rig(view)
     instances = tuple(_instance(scene, piece, view, lights, shading) for piece in pieces)
     problems: list[str] = []
     for piece, instance in zip(pieces, instances, strict=True):
         problems.extend(_needs_uvs(piece, instance.material))
     if problems:
         raise SceneError(problems)
-    return _in_range(Assembly(instances, tuple(lights), view), np.concatenate([piece.box for piece in pieces]))
+    unlit = any(len(lights) in instance.lights for instance in instances)
+    assembly = Assembly(instances, (*lights, WHITE) if unlit else tuple(lights), view, own_light=len(lights) if unlit else None)
+    return _in_range(assembly, np.concatenate([piece.box for piece in pieces]))
 
 
 def _pieces(scene: Scene, shading: Rate | None) -> list[_Piece]:
@@ -122,12 +137,11 @@ def _pieces(scene: Scene, shading: Rate | None) -> list[_Piece]:
     """
     pieces: list[_Piece] = []
     problems: list[str] = []
-    # Name of an object -> its transform and the name of its parent. The objects of a long chain share these arrays.
-    placed = {item.name: (item.transform.array(), item.parent) for item in scene.objects}
+    placements = placed(scene.objects)
     load = scene.loader()
     check_counts(scene, load, shading)
     for number, item in enumerate(scene.objects):
-        world = _world(placed, item)
+        world = world_of(placements, item)
         if not _is_in_range(world):
             problems.append(f"objects[{number}].transform: together with the parents' it is too large or too small")
             continue
@@ -149,7 +163,10 @@ def _view(scene: Scene, pieces: list[_Piece]) -> View:
 
 
 def _instance(scene: Scene, piece: _Piece, view: View, lights: tuple[Light, ...], shading: Rate | None) -> Instance:
-    """Returns the instance of a piece. shading: as in `assemble`."""
+    """Returns the instance of a piece. shading: as in `assemble`. Points and lines are always shaded per pixel."""
+    of_strokes = piece.mesh.strokes is not None
+    if of_strokes:
+        piece = _as_triangles(scene, piece, view)
     item, mesh = piece.item, piece.mesh
     chosen = tuple(
         i
@@ -159,7 +176,10 @@ def _instance(scene: Scene, piece: _Piece, view: View, lights: tuple[Light, ...]
     ambient = any(lights[i].omnidirectional for i in chosen)
     quality = scene.quality_of(item)
     material = quality.material(piece.material).canonical(ambient)
-    rate = shading or quality.shading or item.shading
+    if material.unlit:
+        # WHITE is added to the lights as the last one, and no other light reaches an unlit material.
+        material, chosen = own_colour(material), (len(lights),)
+    rate: Rate = "phong" if of_strokes else shading or quality.shading or item.shading
     tangents = material.needs_tangents or material.normal_map is not None or material.bump_map is not None
     levels = (quality.subdivide or 0) if rate != "phong" else 0
     # The positions of a mesh are relative to its origin.
@@ -167,11 +187,13 @@ def _instance(scene: Scene, piece: _Piece, view: View, lights: tuple[Light, ...]
     world_from_object[:3, 3] += piece.world[:3, :3] @ mesh.origin
     return Instance(
         name=piece.name,
-        mesh=_ready(mesh, rate == "flat", item.normals, item.threshold, tangents, levels),
+        mesh=_strokes_ready(mesh, tangents)
+        if of_strokes
+        else _ready(mesh, rate == "flat", item.normals, item.threshold, tangents and tangent_axes(material), levels),
         world_from_object=world_from_object,
         material=material,
         rate=rate,
-        back_faces=_draws_back_faces(piece, material, view),
+        back_faces=of_strokes or _draws_back_faces(piece, material, view),
         vertex_colours=item.vertex_colours and mesh.colours is not None,
         lights=chosen,
         quality=quality,
@@ -179,6 +201,43 @@ def _instance(scene: Scene, piece: _Piece, view: View, lights: tuple[Light, ...]
         made_of=piece.made_of,
         source=piece.source,
     )
+
+
+def _as_triangles(scene: Scene, piece: _Piece, view: View) -> _Piece:
+    """Returns a piece of points and lines as triangles in world space that face the viewer.
+
+    Without normals, the points and lines show their colours whatever the light. Where they have colours but no material, these
+    colours are shown as they are.
+    """
+    film, mesh, material = scene.film, piece.mesh, piece.material
+    # With one sample a pixel, squares and strips need no antialiasing, and edges between the pixels are more certain.
+    on_grid = film.samples == 1 and film.supersample == 1
+    screen = Viewport(view, film.size, film.point_size, film.point_size, on_grid)
+    if mesh.normals is None:
+        if material is DEFAULT_MATERIAL and mesh.colours is not None and piece.item.vertex_colours:
+            material = material.model_copy(update={"kd": (1.0, 1.0, 1.0)})
+        material = material.model_copy(update={"unlit": True})
+    return replace(piece, mesh=stroked(mesh, piece.world, screen), world=np.eye(4), material=material)
+
+
+def _strokes_ready(mesh: Mesh, tangents: bool) -> Mesh:
+    """Returns the triangles of points and lines, with tangents if these are needed.
+
+    The tangents are those of a mesh without uvs, because uvs do not change across a point or a line.
+    """
+    return replace(with_tangents(replace(mesh, uvs=None)), uvs=mesh.uvs) if tangents else mesh
+
+
+def own_colour(material: Brdf) -> Brdf:
+    """Returns a material that shows the base colour of this one under `WHITE`; without a base colour, its reflectance of
+    ambient light.
+    """
+    base = material.base()
+    if base is None:
+        return material.model_copy(update={"occlusion": None})
+    surface: dict[str, Any] = {name: getattr(material, name) for name in Brdf.model_fields if name != "brdf"}
+    surface |= {"brdf": "lambert", "kd": getattr(material, base), "occlusion": None}
+    return BRDFS["lambert"].model_construct(**surface)
 
 
 def _in_range(assembly: Assembly, corners: Array) -> Assembly:
@@ -206,6 +265,7 @@ def _in_range(assembly: Assembly, corners: Array) -> Assembly:
             half_height=view.half_height * across,
         ),
         unit,
+        assembly.own_light,
     )
 
 
@@ -228,11 +288,18 @@ def _pieces_of(scene: Scene, load: Callable[[Path], Model], number: int, item: O
             label = f"{name}/{part.name}" if len(model.parts) > 1 else name
             made_of = own_name if own else first.setdefault(repr(part.material), label)
             material = own or _file_material(part, item.mesh)
-            yield _Piece(item, number, label, part.mesh, world @ part.transform, material, made_of, model)
-    else:
-        mesh = item.mesh if item.shape is None else item.shape.mesh()
-        assert mesh is not None
-        yield _Piece(item, number, name, mesh, world, own or DEFAULT_MATERIAL, own_name, mesh)
+            mesh = _wound(part.mesh, item, material)
+            yield _Piece(item, number, label, mesh, world @ part.transform, material, made_of, model)
+    elif item.mesh is not None or item.shape is not None:
+        source = item.mesh if item.shape is None else item.shape.mesh()
+        assert source is not None
+        material = own or DEFAULT_MATERIAL
+        yield _Piece(item, number, name, _wound(source, item, material), world, material, own_name, source)
+
+
+def _wound(mesh: Mesh, item: Object, material: Brdf) -> Mesh:
+    """Returns the mesh, wound as its normals say where neither the object nor its material says which sides are drawn."""
+    return turned_over(mesh) if item.sides == "auto" and material.sides == "auto" else mesh
 
 
 # The materials that mesh files give to their parts, for as long as the parts exist.
@@ -242,33 +309,25 @@ _file_materials: WeakKeyDictionary[MeshPart, Brdf] = WeakKeyDictionary()
 def _file_material(part: MeshPart, path: Path) -> Brdf:
     """Returns the material that a mesh file gives to a part; the same object for the same part.
 
+    A part without texture coordinates is drawn without the textures of its material, with a warning.
     path: the mesh file, which messages name.
     Errors: SceneError.
     """
     if part.material is None:
         return DEFAULT_MATERIAL
+    given = plain(part.material) if part.mesh.uvs is None else part.material
+    if given is not part.material:
+        message = f"{path}: {part.name} has no texture coordinates; drawn without the textures of its material"
+        warnings.warn(message, AssetWarning, stacklevel=2)
     try:
         if part not in _file_materials:
-            _file_materials[part] = BRDFS[part.material["brdf"]].model_validate(part.material)
+            _file_materials[part] = BRDFS[given["brdf"]].model_validate(given)
         return _file_materials[part]
     except ValidationError as error:
         faults = error.errors(include_url=False)
         raise SceneError(
             [f"{path}: material of {part.name}: {'.'.join(map(str, e['loc']))}: {e['msg']}" for e in faults]
         ) from None
-
-
-def _world(placed: dict[str | None, tuple[Array, str | None]], item: Object) -> Array:
-    """Returns the transform (4, 4) from an object to world space, through all its parents. Its numbers may be infinite or NaN.
-
-    placed: name of an object -> its transform to its parent's space, and the name of its parent.
-    """
-    world, parent = item.transform.array(), item.parent
-    with np.errstate(all="ignore"):
-        while parent is not None:
-            transform, parent = placed[parent]
-            world = transform @ world
-    return world
 
 
 def _is_in_range(world: Array) -> bool:
@@ -304,7 +363,7 @@ def _draws_back_faces(piece: _Piece, material: Brdf, view: View) -> bool:
 def _needs_uvs(piece: _Piece, material: Brdf) -> Iterator[str]:
     """Yields a fault for each texture of the material if the mesh has no texture coordinates."""
     if piece.mesh.uvs is None:
-        for key in (*material.parameters(), "normal_map", "bump_map", "tangent_direction"):
+        for key in (*material.parameters(), "emission", "occlusion", "normal_map", "bump_map", "tangent_direction"):
             if hasattr(getattr(material, key), "texture"):
                 yield f"{piece.name}: its material's {key} is a texture, but its mesh has no texture coordinates"
 
@@ -327,17 +386,28 @@ def _ready(mesh: Mesh, *wishes: Any) -> Mesh:
     return variants[wishes] or mesh
 
 
-def _make(mesh: Mesh, flat: bool, normals: Normals, threshold: float, tangents: bool, levels: int) -> Mesh:
+def tangent_axes(material: Brdf) -> Axes:
+    """Returns the axes that the tangents follow: those of the map of normals or heights, or else of the map of directions."""
+    maps = (material.normal_map, material.bump_map, material.tangent_direction)
+    placements = [picture.placement for picture in maps if isinstance(picture, Picture)]
+    if not placements:
+        return OWN_AXES
+    across, up = placements[0]
+    return across[:2], up[:2]
+
+
+def _make(mesh: Mesh, flat: bool, normals: Normals, threshold: float, tangents: Axes | Literal[False], levels: int) -> Mesh:
     """Returns a mesh that is ready for one shading rate.
 
     flat: whether each triangle gets vertices of its own, with the normal of the face.
     normals, threshold: as in `with_normals`, [degrees].
-    tangents: whether the mesh gets tangents.
+    tangents: the axes of the mesh's tangents; False for a mesh without them.
     levels: how many times each triangle is cut into four.
     """
-    ready = mesh if flat and not tangents else with_normals(mesh, normals, threshold)
+    # The search for edges is several times as fast where neighbours in space are neighbours in memory.
+    ready = mesh if flat and not tangents else with_normals(ordered(mesh), normals, threshold)
     if tangents:
-        ready = with_tangents(ready)
+        ready = with_tangents(ready, tangents)
     if levels:
         from glshade.mesh.subdivision import subdivided
 

@@ -9,6 +9,7 @@ from glshade.brdfs import Brdf
 from glshade.errors import SceneError
 from glshade.image import file as picture_file
 from glshade.limits import MOST_INSTANCES, TEXELS_PER_BYTE, UNLIMITED, Limits
+from glshade.mesh.mesh import Mesh
 from glshade.mesh.model import Model
 from glshade.scene.object import Object, Rate
 from glshade.scene.scene import Scene
@@ -33,12 +34,12 @@ def check_counts(scene: Scene, load: Callable[[Path], Model], shading: Rate | No
         times = 4 ** _levels(scene, item, shading)
         if isinstance(item.mesh, Path):
             model = load(item.mesh)
-            stored[item.mesh] = sum({id(part.mesh): len(part.mesh.triangles) for part in model.parts}.values())
+            stored[item.mesh] = sum({id(part.mesh): _triangle_count(part.mesh) for part in model.parts}.values())
             parts += len(model.parts)
-            made += times * sum(len(part.mesh.triangles) for part in model.parts)
-        else:
+            made += times * sum(_triangle_count(part.mesh) for part in model.parts)
+        elif item.mesh is not None or item.shape is not None:
             parts += 1
-            made += times * (item.shape.triangle_count if item.shape else len(item.mesh.triangles) if item.mesh else 0)
+            made += times * (item.shape.triangle_count if item.shape else _triangle_count(item.mesh) if item.mesh else 0)
     made -= sum(stored.values())
     if made > scene.limits.max_triangles:
         raise SceneError(
@@ -47,6 +48,11 @@ def check_counts(scene: Scene, load: Callable[[Path], Model], shading: Rate | No
         )
     if parts > MOST_INSTANCES:
         raise SceneError(f"objects: {parts:,} parts are drawn; {MOST_INSTANCES:,} are allowed")
+
+
+def _triangle_count(mesh: Mesh) -> int:
+    """Returns the number of triangles that a mesh is drawn with. A point or a line takes two."""
+    return len(mesh.triangles) if mesh.strokes is None else 2 * len(mesh.strokes)
 
 
 def check_texels(materials: Iterator[Brdf], limits: Limits) -> None:

@@ -8,10 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, Literal
 
-from glshade.assembly.assembly import Assembly
+from glshade.assembly.assembly import WHITE, Assembly, own_colour
 from glshade.assembly.instance import Instance
-from glshade.brdfs import BRDFS, Brdf
-from glshade.lights import LIGHTS, Light
+from glshade.brdfs import BLACK, Brdf
 from glshade.scene.scene import Scene
 
 
@@ -22,8 +21,9 @@ class Part:
     kind: the part that is shown:
         "lit": all light, without the background;
         "light": the light that one of the lights adds;
-        "specular": all light without diffuse lobes and ambient light;
-        "unlit": no light, so that only the background is left;
+        "emission": the light that the surfaces emit, and the base colours of unlit materials;
+        "specular": all light without diffuse lobes, ambient light and emission;
+        "dark": no light, so that only the background is left;
         "albedo": the surfaces' base colours;
         "depth": depth of the nearest surface at the pixel's middle, and the number of its instance in the assembly;
         "uv": texture coordinates of the nearest surface at the pixel's middle;
@@ -32,13 +32,13 @@ class Part:
     light: for the kind "light", index of the light in the assembly's lights.
     """
 
-    kind: Literal["lit", "light", "specular", "unlit", "albedo", "depth", "uv", "normal"]
+    kind: Literal["lit", "light", "emission", "specular", "dark", "albedo", "depth", "uv", "normal"]
     light: int = 0
 
     def scene(self, scene: Scene) -> Scene:
-        """Returns the scene with the film and the storage that the part needs. Only the kind "unlit" keeps the background."""
+        """Returns the scene with the film and the storage that the part needs. Only the kind "dark" keeps the background."""
         changes: dict[str, Any] = {}
-        if self.kind != "unlit":
+        if self.kind != "dark":
             changes["background"] = (0.0, 0.0, 0.0, 0.0)
         if self.kind == "albedo":
             changes["exposure"] = 0.0
@@ -49,26 +49,30 @@ class Part:
 
     def of(self, assembly: Assembly) -> Assembly:
         """Returns the assembly whose picture is the part."""
-        instances = tuple(self._instance(number, item, assembly.lights) for number, item in enumerate(assembly.instances))
-        return replace(assembly, instances=instances, lights=(_WHITE,) if self.kind == "albedo" else assembly.lights)
+        instances = tuple(self._instance(number, item, assembly) for number, item in enumerate(assembly.instances))
+        return replace(assembly, instances=instances, lights=(WHITE,) if self.kind == "albedo" else assembly.lights)
 
-    def _instance(self, number: int, instance: Instance, lights: tuple[Light, ...]) -> Instance:
+    def _instance(self, number: int, instance: Instance, assembly: Assembly) -> Instance:
         """Returns an instance as the part shows it.
 
         number: index of the instance in the assembly.
-        lights: the assembly's lights.
+        assembly: the assembly.
         """
         if self.kind == "lit":
             return instance
-        if self.kind == "unlit":
+        if self.kind == "emission":
+            return replace(instance, lights=tuple(i for i in instance.lights if i == assembly.own_light))
+        # Each further part shows the surface without its emission.
+        instance = replace(instance, material=instance.material.model_copy(update={"emission": BLACK}))
+        if self.kind == "dark":
             return replace(instance, lights=())
         if self.kind == "light":
             return replace(instance, lights=tuple(i for i in instance.lights if i == self.light))
         if self.kind == "albedo":
-            return replace(instance, material=_own_colour(instance.material), lights=(0,))
+            return replace(instance, material=own_colour(instance.material), lights=(0,))
         if self.kind == "specular":
             material = instance.material.specular_part()
-            directed = tuple(i for i in instance.lights if not lights[i].omnidirectional)
+            directed = tuple(i for i in instance.lights if not assembly.lights[i].omnidirectional)
             return replace(instance, material=material, lights=directed) if material else replace(instance, lights=())
         solid: Brdf = instance.material
         if solid.alpha_mode == "blend":
@@ -79,14 +83,3 @@ class Part:
         rate = instance.rate if self.kind == "normal" else "phong"
         return replace(instance, material=solid, lights=(), number=number, rate=rate, shows=shows)
 
-
-_WHITE: Any = LIGHTS["ambient"].model_validate({"intensity": 1.0})
-
-
-def _own_colour(material: Brdf) -> Brdf:
-    """Returns a material that shows the base colour of this one under white ambient light; without one, this material."""
-    base = material.base()
-    if base is None:
-        return material
-    surface: dict[str, Any] = {name: getattr(material, name) for name in Brdf.model_fields if name != "brdf"}
-    return BRDFS["lambert"].model_construct(**{**surface, "brdf": "lambert", "kd": getattr(material, base)})

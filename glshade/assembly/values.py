@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from glshade.arrays import rounded
 from glshade.assembly.assembly import Assembly
+from glshade.assembly.instance import Instance
 from glshade.brdfs import Array, Brdf, parameter_values
 from glshade.errors import SceneError
 from glshade.lights import FALLOFFS, Falloff, Light
@@ -104,6 +105,33 @@ def ambient_reflectance(material: Brdf) -> Array:
         given = (value.factor if material.is_colour(name) else value.factor[0]) if isinstance(value, Texture) else value
         values[name] = np.asarray(given, dtype=np.float64)
     return type(material).ambient_reflectance(SimpleNamespace(**values, **material.chosen()))
+
+
+def emitted(instance: Instance, exposure: float) -> NDArray[np.float32]:
+    """Returns the light (3,) that an instance emits, or the factor of its emission's texture, with exposure.
+
+    exposure: exposure of the film [stops].
+    Errors: SceneError for a value that is too large for float32.
+    """
+    emission = instance.material.emission
+    return _exposed(instance, emission.factor if isinstance(emission, Texture) else emission, exposure)
+
+
+def emitted_beside(instance: Instance, exposure: float) -> NDArray[np.float32]:
+    """Returns the light (3,) that is added to the emission's texture, with exposure; 0 without a texture.
+
+    exposure: exposure of the film [stops].
+    Errors: SceneError for a value that is too large for float32.
+    """
+    emission = instance.material.emission
+    return _exposed(instance, emission.add if isinstance(emission, Texture) else (0.0, 0.0, 0.0), exposure)
+
+
+def _exposed(instance: Instance, emission: tuple[float, float, float], exposure: float) -> NDArray[np.float32]:
+    result = rounded(np.array(emission) * 2.0**exposure)
+    if not np.isfinite(result).all():
+        raise SceneError(f"{instance.name}: emission is too large for float32")
+    return result
 
 
 def turn(material: Brdf) -> float:

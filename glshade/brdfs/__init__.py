@@ -22,7 +22,7 @@ from glshade.arrays import rounded
 from glshade.document import Document, Finite, Triple, fault
 from glshade.errors import figure
 from glshade.found import Found
-from glshade.textures.texture import BumpMap, DirectionMap, NormalMap, Picture, Texture
+from glshade.textures.texture import BumpMap, DirectionMap, NormalMap, OcclusionMap, Picture, Texture
 
 Array = NDArray[np.float64]
 
@@ -85,6 +85,12 @@ def choice(default: str, description: str) -> Any:
     return Field(default, description=description, json_schema_extra={"glshade_choice": True})
 
 
+# The emission of every material. It is declared like a model's parameter, but it is no member of the models' structs: it is
+# light that the surface adds, whatever its model reflects.
+EMISSION = Parameter("light that the surface emits, added to the light that it reflects: 1 looks white")
+BLACK = (0.0, 0.0, 0.0)
+
+
 # Physical properties that every model has unless its `breaks` names them. Reciprocity: f(l, v) = f(v, l). Energy: no more light
 # leaves a surface than arrives.
 Law = Literal["reciprocity", "energy"]
@@ -117,6 +123,11 @@ class Brdf(Document):
     )
     alpha_cutoff: Annotated[float, Field(ge=0, le=1)] = Field(
         0.5, description="mask: pixels with a smaller alpha are not drawn"
+    )
+    emission: Colour = Field(BLACK, description=EMISSION.description)
+    occlusion: OcclusionMap | None = Field(None, description="how much of the ambient light reaches each point")
+    unlit: bool = Field(
+        False, description="whether the surface shows its base colour in place of the light that it reflects"
     )
     normal_map: NormalMap | None = Field(None, description="tangent-space normals")
     bump_map: BumpMap | None = Field(None, description="heights that normals are computed from; not together with normal_map")
@@ -163,6 +174,11 @@ class Brdf(Document):
         return found
 
     @classmethod
+    def declared(cls, name: str) -> Parameter | None:
+        """Returns the declaration of a parameter or of emission; None for the other keys."""
+        return EMISSION if name == "emission" else cls.parameters().get(name)
+
+    @classmethod
     @cache
     def choices(cls) -> tuple[str, ...]:
         """Returns the names of the options."""
@@ -196,10 +212,15 @@ class Brdf(Document):
         name = self.base()
         if name is None:
             return self
-        value, black = getattr(self, name), (0.0, 0.0, 0.0)
+        value = getattr(self, name)
         # Where alpha matters, the texture stays for its alpha, and a factor of 0 makes its colours black.
         keeps = isinstance(value, Texture) and self.alpha_mode != "opaque"
-        return self.model_copy(update={name: value.model_copy(update={"factor": black}) if keeps else black})
+        return self.model_copy(update={name: value.model_copy(update={"factor": BLACK, "add": BLACK}) if keeps else BLACK})
+
+    @property
+    def emits(self) -> bool:
+        """Whether the surface may emit light."""
+        return any((*self.emission.factor, *self.emission.add) if isinstance(self.emission, Texture) else self.emission)
 
     def slots(self) -> dict[str, Slot]:
         """Returns the GLSL for each name in angle brackets in the model's GLSL file. Parts that this material does not need are
@@ -230,9 +251,9 @@ class Brdf(Document):
     @classmethod
     @cache
     def is_colour(cls, name: str) -> bool:
-        """Returns whether the parameter is a colour."""
-        default = cls.model_fields[name].default
-        same_as = cls.parameters()[name].same_as
+        """Returns whether the parameter, or emission, is a colour."""
+        default, declared = cls.model_fields[name].default, cls.declared(name)
+        same_as = declared.same_as if declared else None
         return cls.is_colour(same_as) if default is None and same_as else isinstance(default, tuple)
 
     @classmethod
@@ -240,7 +261,7 @@ class Brdf(Document):
         """Adds the parameters' bounds to the JSON schema. pydantic does not know them, because `_within` checks them."""
         described = handler(schema)
         properties = handler.resolve_ref_schema(described)["properties"]
-        for name, declared in cls.parameters().items():
+        for name, declared in {**cls.parameters(), "emission": EMISSION}.items():
             # Fields of one type share their description, so a copy is changed.
             properties[name] = deepcopy(properties[name])
             _bound(properties[name], declared)
@@ -259,7 +280,7 @@ class Brdf(Document):
     @field_validator("*", mode="after")
     @classmethod
     def _within(cls, value: Any, info: ValidationInfo) -> Any:
-        declared = cls.parameters().get(info.field_name or "")
+        declared = cls.declared(info.field_name or "")
         if declared is not None and isinstance(value, Texture) and value.channel and cls.is_colour(info.field_name or ""):
             raise fault(f'a colour reads three channels, so channel = "{value.channel}" is not allowed')
         if declared is None or value is None or isinstance(value, Texture):

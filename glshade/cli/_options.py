@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 # Key of the film -> name of its option, for options whose name differs from the key.
-OPTIONS = {"aovs": "aov"}
+OPTIONS = {"aovs": "aov", "point_size": "point-size"}
 
 
 class Size(click.ParamType[tuple[int, int]]):
@@ -137,6 +137,13 @@ def _use_models(ctx: click.Context, option: click.Parameter, folders: tuple[str,
     return folders
 
 
+def point_size(command: Any) -> Any:
+    """Adds the option --point-size, whose value is that of the film's key."""
+    return click.option(
+        "--point-size", type=float, metavar="N", help="Side of the squares that points become, and width of lines [pixels]."
+    )(command)
+
+
 def limits(command: Any) -> Any:
     """Adds the options that raise a limit. The command gets their values as one argument `limits`, as `glshade.load` takes it.
 
@@ -164,7 +171,22 @@ def limits(command: Any) -> Any:
 
 
 def overrides(command: Any) -> Any:
-    """Adds the option --set, whose value `overrides` holds (key, text) pairs, as `glshade.load` takes them."""
+    """Adds the options --set, --up and --file-lights.
+
+    The command gets their values as (key, text) pairs in `overrides`, as `glshade.load` takes them.
+    """
+
+    @wraps(command)
+    def overridden(*arguments: Any, overrides: list[tuple[str, str]], up: str | None, file_lights: bool, **others: Any) -> Any:
+        first = [("up", up)] if up else []
+        if file_lights:
+            first.append(("file_lights", "true"))
+        return command(*arguments, overrides=[*first, *overrides], **others)
+
+    help = "Axis of a mesh file that points up; auto is z for .stl and y for the others (docs/files.md). [default: auto]"
+    lights = "Draws mesh files with the lights that they hold, in lux and candela, and not with the default lights."
+    overridden = click.option("--file-lights", is_flag=True, help=lights)(overridden)
+    overridden = click.option("--up", type=click.Choice(["x", "y", "z", "auto"]), help=help)(overridden)
     return click.option(
         "--set",
         "overrides",
@@ -173,7 +195,7 @@ def overrides(command: Any) -> Any:
         callback=lambda ctx, param, texts: _assignments(texts, param),
         help="Replaces a value of the scene: quality.fresnel=schlick, materials.body.roughness=0.3, "
         "objects.ball.material=gold, lights.0.intensity=2, film.size=[640,360]. Repeatable.",
-    )(command)
+    )(overridden)
 
 
 def _assignments(texts: tuple[str, ...], option: click.Parameter) -> list[tuple[str, str]]:

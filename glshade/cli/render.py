@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from glshade.cli._options import Crop, Duration, Size, driver, filmed, limits, models, overrides, shaders
+from glshade.cli._options import Crop, Duration, Size, driver, filmed, limits, models, overrides, point_size, shaders
 from glshade.image.formats import FORMATS
 from glshade.limits import DEFAULT, MOST_TASKS, Limits
 from glshade.mesh.formats import SUFFIXES
@@ -89,6 +89,7 @@ if TYPE_CHECKING:
 @click.option("--size", type=Size(), help="Overrides the film's size [pixels].")
 @click.option("--crop", type=Crop(), help="Draws only this window of the picture, counted from the top left [pixels].")
 @click.option("--samples", type=click.Choice(["1", "2", "4", "8"]), help="Overrides the film's samples per pixel.")
+@point_size
 @click.option("--supersample", type=int, metavar="N", help="Averages N x N pictures, each shifted within the pixel.")
 @click.option(
     "--tile", type=click.IntRange(2), metavar="N", help="Largest side of a region that is drawn in one piece [pixels]."

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from glshade.cli._options import Size, driver, filmed, limits, models, overrides, shaders
+from glshade.cli._options import Size, driver, filmed, limits, models, overrides, point_size, shaders
 from glshade.limits import Limits
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 @shaders
 @models
 @click.option("--size", type=Size(), help="Overrides the film's size [pixels].")
+@point_size
 @click.option(
     "--shading",
     type=click.Choice(["flat", "gouraud", "phong"]),
@@ -56,6 +57,7 @@ def command(
     backend: Any,
     device: int | None,
     size: tuple[int, int] | None,
+    point_size: float | None,
     shaders: tuple[str, ...],
     models: tuple[str, ...],
     shading: Any,
@@ -80,7 +82,7 @@ def command(
         raise click.UsageError("Missing argument 'SCENE'.")
     from glshade.scene.file import load
 
-    loaded = filmed(load(scene, overrides, limits=limits), {"size": size})
+    loaded = filmed(load(scene, overrides, limits=limits), {"size": size, "point_size": point_size})
     if mutate is not None:
         _mutate(loaded, mutate, backend, device, shaders, shading, derived, as_json)
         return

@@ -31,8 +31,8 @@ from glshade.scene.scene import Scene
 Maker = Callable[[], Source]
 ENCODINGS: tuple[Literal["linear", "srgb"], ...] = ("linear", "srgb")
 # The parts of a picture that layers are made of, besides the light of each lamp.
-LAYERS: tuple[Literal["lit", "specular", "albedo", "depth", "uv", "normal"], ...] = (
-    *("lit", "specular", "albedo"),
+LAYERS: tuple[Literal["lit", "specular", "emission", "albedo", "depth", "uv", "normal"], ...] = (
+    *("lit", "specular", "emission", "albedo"),
     *("depth", "uv", "normal"),
 )
 SHADER_SUFFIXES = (".glsl", ".vert", ".frag")

@@ -141,7 +141,7 @@ class _Maker:
         return {"albedo": self._draw(Part("albedo"))[..., :3]}
 
     def background(self) -> Arrays:
-        return {"background": self._draw(Part("unlit"))[..., :3]}
+        return {"background": self._draw(Part("dark"))[..., :3]}
 
     @cached_property
     def _specular(self) -> Array:
@@ -151,8 +151,21 @@ class _Maker:
         return {"specular": self._specular}
 
     def diffuse(self) -> Arrays:
-        # The difference makes the two layers add up exactly to the light that is drawn.
-        return {"diffuse": self._draw(Part("lit"))[..., :3] - self._specular}
+        # The difference makes the layers add up exactly to the light that is drawn.
+        reflected = self._draw(Part("lit"))[..., :3] - self._specular
+        return {"diffuse": reflected if self._emission is None else reflected - self._emission}
+
+    @cached_property
+    def _emission(self) -> Array | None:
+        """The light (H, W, 3) that surfaces emit or, if unlit, show; None if there is none."""
+        materials = [instance.material for instance in self.assembly.instances]
+        if not any(material.emits or material.unlit for material in materials):
+            return None
+        return self._draw(Part("emission"))[..., :3]
+
+    def emission(self) -> Arrays:
+        width, height = self._scene.film.window[2:]
+        return {"emission": np.zeros((height, width, 3), np.float32) if self._emission is None else self._emission}
 
     def lights(self) -> Arrays:
         return {name: self._draw(Part("light", index))[..., :3] for index, name in enumerate(light_layers(self.assembly))}
@@ -213,12 +226,12 @@ def positions(depth: NDArray[np.float64], assembly: Assembly, film: Film) -> NDA
 
 
 def light_layers(assembly: Assembly) -> list[str]:
-    """Returns the name of each light's layer: `light_` with the light's name or index.
+    """Returns the name of the layer of each of the scene's lights: `light_` with the light's name or index.
 
     Characters that are not letters, digits or _ are replaced, because EXR files separate layers and channels by dots.
     """
     names: list[str] = []
-    for index, light in enumerate(assembly.lights):
+    for index, light in enumerate(assembly.lights[: assembly.own_light]):
         name = f"light_{re.sub(r'[^0-9A-Za-z_]', '_', light.name or str(index))}"
         names.append(name if name not in names else f"{name}_{index}")
     return names

@@ -23,7 +23,7 @@ from glshade.glsl.plan import PAGE, ProgramPlan
 from glshade.glsl.planner import further_plan, plan_instance
 from glshade.glsl.shaders import Shaders
 from glshade.glsl.source import Rewrite
-from glshade.glsl.uniforms import Values, ambient_radiance, light_pages, light_uniforms, object_uniforms, textures
+from glshade.glsl.uniforms import Values, exposed_uniforms, light_pages, light_uniforms, object_uniforms, textures
 from glshade.mesh.mesh import Mesh
 from glshade.scene.scene import Scene
 
@@ -203,8 +203,7 @@ class _Calls:
             page_plan = plan if index == 0 else further_plan(plan, instance, [len(group) for group in pages], index)
             program = self._program(page_plan)
             values = object_uniforms(page_plan, instance, assembly.view.eye)
-            if page_plan.ambient == "constant":
-                values |= ambient_radiance(instance, assembly, self._exposure)
+            values |= exposed_uniforms(page_plan, instance, assembly, self._exposure)
             _check_finite(instance, values)
             all_texels = textures(page_plan, instance.material)
             samplers = [(name, self._resources.texture(texels)) for name, texels in all_texels.items()]

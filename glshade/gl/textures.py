@@ -21,16 +21,20 @@ GL_RGBA32F, GL_RGBA, GL_FLOAT = 0x8814, 0x1908, 0x1406
 
 
 def upload(context: Context, texels: Texels) -> moderngl.Texture:
-    """Returns a texture with trilinear filtering. Levels that are larger than the driver allows are left out.
+    """Returns a texture with trilinear filtering, or with the nearest texel of a magnified picture where the texels ask for it.
+
+    Levels that are larger than the driver allows are left out.
 
     context: the context, which must be current.
-    texels: the picture and its wrap modes.
+    texels: the picture, its wrap modes and its filter.
     Errors: AssetError.
     """
     chain = list(levels(texels.read()))
     while max(chain[0].shape[:2]) > context.largest_side:
         chain.pop(0)
     result = mipmapped(context, chain)
+    if texels.filter == "nearest":
+        result.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.NEAREST)
     result.repeat_x, result.repeat_y = (mode != "clamp" for mode in texels.wrap)
     if "mirror" in texels.wrap:
         _mirror(context, result, texels.wrap)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import moderngl
@@ -45,7 +46,7 @@ class Vertices:
             return self._array(mesh, program, self._context.gl.buffer(triangles.data))
         arrays = self._arrays.setdefault(mesh, WeakKeyDictionary())
         if program not in arrays:
-            arrays[program] = self._array(mesh, program, self._buffer(mesh, (), mesh.triangles.tobytes))
+            arrays[program] = self._array(mesh, program, self._buffer(mesh, (), lambda: mesh.triangles))
         return arrays[program]
 
     def _array(self, mesh: Mesh, program: Program, indices: moderngl.Buffer) -> moderngl.VertexArray:
@@ -55,7 +56,7 @@ class Vertices:
         layout = " ".join(f"{size}f" for size in sizes)
         return self._context.gl.vertex_array(program.gl, [(buffer, layout, *names)], indices)
 
-    def _buffer(self, mesh: Mesh, key: tuple[str, ...], data: Callable[[], bytes]) -> moderngl.Buffer:
+    def _buffer(self, mesh: Mesh, key: tuple[str, ...], data: Callable[[], NDArray[Any]]) -> moderngl.Buffer:
         """Returns the cached buffer of a mesh. key: the attributes that it holds; empty for the buffer of triangles."""
         buffers = self._buffers.setdefault(mesh, {})
         if key not in buffers:
@@ -63,6 +64,6 @@ class Vertices:
         return buffers[key]
 
 
-def _interleaved(mesh: Mesh, names: tuple[str, ...]) -> bytes:
-    """Returns the attributes of a mesh as bytes, vertex after vertex, so that the data of one vertex lies together."""
-    return np.hstack([getattr(mesh, ATTRIBUTES[name][0]) for name in names]).tobytes()
+def _interleaved(mesh: Mesh, names: tuple[str, ...]) -> NDArray[np.float32]:
+    """Returns the attributes of a mesh, a row for each vertex, so that the data of one vertex lies together."""
+    return np.hstack([getattr(mesh, ATTRIBUTES[name][0]) for name in names])

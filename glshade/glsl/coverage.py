@@ -81,6 +81,10 @@ def _without_model(base: ProgramPlan) -> Iterator[ProgramPlan]:
     dark = replace(base, slots=(), lights=(), ambient="none", encoding="linear", anisotropic=False)
     dark = replace(dark, parameters=tuple((name, "unused") for name, _ in base.parameters))
     yield from (dark, replace(dark, ambient="constant"))
+    glow = replace(base, emission="texture", occlusion="texture.r")
+    yield from (replace(glow, rate=rate) for rate in RATES)
+    yield replace(dark, emission="grey", ambient="constant", occlusion="texture.a")
+    yield replace(dark, emission="uniform")
     kinds: tuple[Shows, ...] = ("normal", "uv", "depth")
     yield from (replace(dark, parameters=(), shows=shows, rate=rate) for shows, rate in product(kinds, RATES))
 

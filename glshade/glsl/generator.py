@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from weakref import WeakKeyDictionary
 
-from glshade.brdfs import BRDFS, Brdf, Parameter, Slot
+from glshade.brdfs import BRDFS, EMISSION, Brdf, Parameter, Slot
 from glshade.glsl.definitions import unreached
 from glshade.glsl.plan import PAGE, LightGroup, ProgramPlan, channel
 from glshade.glsl.shaders import Shaders, current, expand
@@ -277,12 +277,71 @@ def _parameter(plan: ProgramPlan, name: str, use: str, at: _Interpolated | _AtVe
         picture = plan.picture_of(name)
         if picture not in bound:
             bound.add(picture)
-            code.uniform("sampler2D", f"u_{picture}_texture")
+            _declare_texture(plan, f"u_{picture}_texture", code)
         channels = texture_channel or ("rgb" if colour else "r")
-        value = _bounded(f"{value} * texture(u_{picture}_texture, {at.uv}).{channels}", declared)
+        value = _bounded(f"{value} * {_texel(plan, name, at)}.{channels}{_added(plan, name, code, colour)}", declared)
     if declared.base and plan.vertex_colours:
         value += f" * {at.colour}.rgb"
     return value
+
+
+def _texel(plan: ProgramPlan, name: str, at: _Interpolated | _AtVertex) -> str:
+    """Returns the expression of the texel of a parameter, of emission or of occlusion."""
+    return _lookup(plan, f"u_{plan.picture_of(name)}_texture", at.uv)
+
+
+def _emission_and_occlusion(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
+    """`vec3 emission()`, which returns the light that the surface emits, and `float occlusion()`, which returns the factor of
+    ambient light. Each is left out where the plan does not use it. The code must follow that of `_material`.
+    """
+    code = Code()
+    bound = {plan.picture_of(name) for name, use in plan.parameters if channel(use) is not None}
+    for name in ("emission", "occlusion"):
+        picture = plan.picture_of(name)
+        if name in plan.textured and picture not in bound:
+            bound.add(picture)
+            _declare_texture(plan, f"u_{picture}_texture", code)
+    if plan.emission != "unused":
+        grey = plan.emission == "grey"
+        code.uniform("float" if grey else "vec3", "u_emission")
+        value = "vec3(u_emission)" if grey else "u_emission"
+        if plan.emission == "texture":
+            value = _bounded(f"{value} * {_texel(plan, 'emission', at)}.rgb{_added(plan, 'emission', code)}", EMISSION)
+        code.add(f"\nvec3 emission() {{\n    return {value};\n}}\n")
+    if plan.occlusion != "unused":
+        code.uniform("float", "u_occlusion")
+        texel = f"{_texel(plan, 'occlusion', at)}.{channel(plan.occlusion)}"
+        value = f"1.0 + u_occlusion * (clamp({texel}, 0.0, 1.0) - 1.0)"
+        code.add(f"\nfloat occlusion() {{\n    return {value};\n}}\n")
+    return code
+
+
+def _added(plan: ProgramPlan, name: str, code: Code, colour: bool = True) -> str:
+    """Returns the end of a sum that adds a number to a parameter's texels, which the code declares; empty without one."""
+    if name not in plan.added:
+        return ""
+    code.uniform("vec3" if colour else "float", f"u_{name}_add")
+    return f" + u_{name}_add"
+
+
+def _declare_texture(plan: ProgramPlan, sampler: str, code: Code) -> None:
+    """Adds the declarations of a texture to the code: its sampler, and the matrix of a texture that is placed by one."""
+    code.uniform("sampler2D", sampler)
+    if sampler in plan.placed:
+        code.include("surface/placed_uv.glsl").uniform("vec3", f"{sampler}_across").uniform("vec3", f"{sampler}_up")
+
+
+def _lookup(plan: ProgramPlan, sampler: str, uv: str, span: tuple[int, int] = (1, 1)) -> str:
+    """Returns the expression of a texture's value (vec4).
+
+    sampler: the name of the texture, which `_declare_texture` declares.
+    uv: the expression of the mesh's texture coordinates.
+    span: how many units of texture coordinates the texels span.
+    """
+    at = f"placed_uv({uv}, {sampler}_across, {sampler}_up)" if sampler in plan.placed else uv
+    # The span is 1 or 2, and division by 2 is exact, so the texture coordinates keep all their digits.
+    u, v = span
+    return f"texture({sampler}, {at if span == (1, 1) else f'{at} / vec2({u}.0, {v}.0)'})"
 
 
 def _bounded(value: str, declared: Parameter) -> str:
@@ -300,27 +359,26 @@ def _frame(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
     """`Frame frame(float side)`, which returns the shading frame; side -1 reverses the normal."""
     code = Code().include("surface/frame.glsl", "math/unit.glsl")
     if plan.normal_map:
-        code.include("surface/normal_map.glsl").uniform("sampler2D", "u_normal_map").uniform("float", "u_normal_scale")
+        _declare_texture(plan, "u_normal_map", code.include("surface/normal_map.glsl"))
+        code.uniform("float", "u_normal_scale")
     elif plan.tangents:
         code.include("surface/tangent_frame.glsl")
     if plan.turned or plan.direction_map:
         code.include("surface/turned_frame.glsl")
     if plan.direction_map:
-        code.include("surface/direction_map.glsl").uniform("sampler2D", "u_direction_map")
+        _declare_texture(plan, "u_direction_map", code.include("surface/direction_map.glsl"))
     if plan.turned:
         code.uniform("vec2", "u_turn")
     if plan.normal_map:
-        u, v = plan.normal_span
-        # The span is 1 or 2, and division by 2 is exact, so the texture coordinates keep all their digits.
-        uv = at.uv if (u, v) == (1, 1) else f"{at.uv} / vec2({u}.0, {v}.0)"
-        frame = f"mapped_frame({at.normal}, {at.tangent}, side, texture(u_normal_map, {uv}).xyz, u_normal_scale)"
+        mapped = _lookup(plan, "u_normal_map", at.uv, plan.normal_span)
+        frame = f"mapped_frame({at.normal}, {at.tangent}, side, {mapped}.xyz, u_normal_scale)"
     elif plan.tangents:
         frame = f"tangent_frame({at.normal}, {at.tangent}, side)"
     else:
         normal = f"unit({at.normal})" if plan.normalise else at.normal
         frame = f"Frame(side * {normal}, vec3(0.0), vec3(0.0))"
     if plan.direction_map:
-        frame = f"turned_frame({frame}, mapped_direction(texture(u_direction_map, {at.uv}).rg))"
+        frame = f"turned_frame({frame}, mapped_direction({_lookup(plan, 'u_direction_map', at.uv)}.rg))"
     if plan.turned:
         frame = f"turned_frame({frame}, u_turn)"
     return code.add(f"\n// A side of -1 reverses the normal.\nFrame frame(float side) {{\n    return {frame};\n}}\n")
@@ -358,11 +416,11 @@ def _light(group: LightGroup) -> str:
     return f"{LIGHTS.class_name(group.type)}({', '.join(values)})"
 
 
-def _loop(group: LightGroup) -> str:
-    """Returns the lines that add the light of a group to the colour `c`."""
+def _loop(group: LightGroup, occluded: bool) -> str:
+    """Returns the lines that add the light of a group to the colour `c`. occluded: whether `o` multiplies ambient light."""
     inner = [f"{LIGHTS.class_name(group.type)} light = {_light(group)};"]
     if group.omnidirectional:
-        inner.append("c += illuminate(light, f.n) * ambient_reflectance(m);")
+        inner.append(f"c += {'o * ' if occluded else ''}illuminate(light, f.n) * ambient_reflectance(m);")
     else:
         inner += ["vec3 l;", "vec3 e = illuminate(light, p, l);"]
         if group.falloff != "none":
@@ -378,7 +436,9 @@ def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
     code = at.declarations
     if plan.shows != "light":
         return code.join(_shown(plan, at))
-    ambient, body = "vec3(0.0)", ""
+    occluded = plan.occlusion != "unused"
+    body = "    float o = occlusion();\n" if occluded else ""
+    ambient = "vec3(0.0)"
     if plan.ambient == "constant":
         code.uniform("vec3", "u_ambient_radiance")
         ambient = "u_ambient_radiance"
@@ -386,11 +446,16 @@ def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
         code.include("light/ambient.glsl").uniform("vec3", "u_ambient_intensity")
         # This light is the same for every normal.
         ambient = "illuminate(AmbientLight(u_ambient_intensity), vec3(0.0)) * ambient_reflectance(m)"
+    if occluded and plan.ambient != "none":
+        ambient = f"o * {ambient}"
+    if plan.emission != "unused":
+        ambient = "emission()" if plan.ambient == "none" else f"emission() + {ambient}"
     if plan.lights or plan.ambient == "varying":
         code.join(_material(plan, at))
-        body = f"    {BRDFS.class_name(plan.brdf)} m = material();\n"
+        body += f"    {BRDFS.class_name(plan.brdf)} m = material();\n"
+    code.join(_emission_and_occlusion(plan, at))
     if not plan.lights:
-        # Without any light the surface is drawn black: it still covers what lies behind it.
+        # Without any light the surface is drawn black, or shows its emission: it still covers what lies behind it.
         return code.add(f"\nvec3 radiance(float side) {{\n{body}    return {ambient};\n}}\n")
     code.join(_frame(plan, at))
     body += "    Frame f = frame(side);\n"
@@ -400,7 +465,7 @@ def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
         body += f"    vec3 p = {position};\n    vec3 v = above_horizon(viewer(p), f.n);\n"
     for group in plan.lights:
         code.join(_lights(group))
-    body += f"    vec3 c = {ambient};\n" + "".join(map(_loop, plan.lights))
+    body += f"    vec3 c = {ambient};\n" + "".join(_loop(group, occluded) for group in plan.lights)
     return code.add(f"\nvec3 radiance(float side) {{\n{body}    return c;\n}}\n").join(_faces_viewer(plan, at))
 
 
@@ -452,8 +517,8 @@ def _alpha(plan: ProgramPlan) -> Code:
     code, value = Code().uniform("float", "u_alpha"), "u_alpha"
     if plan.alpha_from:
         if plan.rate != "phong" or not bound_for_shading(plan, plan.alpha_from):
-            code.uniform("sampler2D", f"u_{plan.alpha_from}_texture")
-        value += f" * texture(u_{plan.alpha_from}_texture, v_uv).a"
+            _declare_texture(plan, f"u_{plan.alpha_from}_texture", code)
+        value += f" * {_lookup(plan, f'u_{plan.alpha_from}_texture', 'v_uv')}.a"
     if plan.vertex_colours:
         value += f" * {_read(plan, 'v_colour')}.a"
     if plan.alpha == "blend":

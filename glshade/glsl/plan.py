@@ -107,6 +107,10 @@ class ProgramPlan:
     normalise: whether interpolated normals are normalised.
     arithmetic: stable, or fast (textbook formulas in place of the numerically stable ones).
     shows: light, or the other property of the surface that is drawn in its place.
+    emission: the use of the emission that every material has, one of Use; "unused" for a surface that emits no light.
+    occlusion: the use of the map that multiplies ambient light: the texture with its channel ("texture.r"), or "unused".
+    added: the textured parameters, or emission, to whose texels a number is added.
+    placed: the samplers of the textures that are read at coordinates which a matrix makes from those of the mesh.
     scaled: whether values that are interpolated at the centroid may come with a wrong factor, which the fragment stage divides
         out.
     """
@@ -132,6 +136,10 @@ class ProgramPlan:
     normalise: bool = True
     arithmetic: Literal["stable", "fast"] = "stable"
     shows: Shows = "light"
+    emission: str = "unused"
+    occlusion: str = "unused"
+    added: tuple[str, ...] = ()
+    placed: tuple[str, ...] = ()
     scaled: bool = False
 
     @property
@@ -165,8 +173,9 @@ class ProgramPlan:
 
     @property
     def textured(self) -> tuple[str, ...]:
-        """The names of the parameters that are textures."""
-        return tuple(name for name, use in self.parameters if channel(use) is not None)
+        """The names of the parameters that are textures, and of emission and occlusion where they are."""
+        uses = (*self.parameters, ("emission", self.emission), ("occlusion", self.occlusion))
+        return tuple(name for name, use in uses if channel(use) is not None)
 
     @property
     def coloured(self) -> bool:
@@ -206,9 +215,12 @@ class ProgramPlan:
 
     def _extras(self) -> list[str]:
         """Returns the optional features of the program, in words."""
-        channels = {name: channel(use) for name, use in self.parameters}
-        textures = [f"{name} textured" + (f" ({channels[name]})" if channels[name] else "") for name in self.textured]
+        channels = {name: channel(use) for name, use in (*self.parameters, ("occlusion", self.occlusion))}
+        textures = [f"{name} textured" + (f" ({channels[name]})" if channels.get(name) else "") for name in self.textured]
         present = {
+            "textures placed by a matrix": bool(self.placed),
+            f"numbers added to {', '.join(self.added)}": bool(self.added),
+            "emission": self.emission in ("uniform", "grey"),
             "normal map" if self.normal_span == (1, 1) else "normal map (mirrored)": self.normal_map,
             "tangents by a map": self.direction_map,
             "tangents turned": self.turned,

@@ -5,21 +5,22 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal
 
 from glshade.assembly.assembly import Assembly
 from glshade.assembly.instance import Instance
 from glshade.assembly.values import ambient_reflectance, turn
 from glshade.brdfs import BRDFS, Brdf
-from glshade.glsl.plan import EXACT_LIGHTS, PAGE, LightGroup, Plan, ProgramPlan, Viewer, is_grey, is_white, kind
+from glshade.glsl.plan import EXACT_LIGHTS, PAGE, LightGroup, Plan, ProgramPlan, Use, Viewer, channel, is_grey, is_white, kind
 from glshade.glsl.reasoning import reasons
+from glshade.glsl.uniforms import added, placed
 from glshade.lights import Falloff, Light
 from glshade.radiance.readying import ready
 from glshade.scene.camera import View
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
-from glshade.textures.texels import Texels, texels_of
-from glshade.textures.texture import DirectionMap, Texture
+from glshade.textures.texels import Texels, placement_of, texels_of
+from glshade.textures.texture import DirectionMap, Placement, Texture
 
 # viewer/perspective.glsl is used only if the near plane is at least this far away, in the assembly's unit. The square of a
 # shorter vector to the viewer comes close to the smallest normal float32 (1.2e-38). No visible point is nearer than the near
@@ -57,7 +58,7 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
     if ambient == "varying" or any(group.omnidirectional for group in groups):
         asked |= seen
     parameters, shared = [], []
-    pictures: dict[Texels, str] = {}
+    pictures: dict[tuple[Texels, Placement], str] = {}
     for name, declared in model.parameters().items():
         value = getattr(material, name)
         if name not in asked:
@@ -65,21 +66,28 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         elif value is None and declared.same_as is not None:
             use = declared.same_as
         else:
-            grey = model.is_colour(name) and not isinstance(value, Texture) and is_grey(value)
-            use = "grey" if grey else "uniform"
+            use = _use_of_colour(value) if model.is_colour(name) else _use_of_number(value)
             if isinstance(value, Texture):
-                use = "texture" if model.is_colour(name) else f"texture.{value.channel or 'r'}"
-                first = pictures.setdefault(texels_of(material, name), name)
+                first = pictures.setdefault(_read_as(material, name), name)
                 if first != name:
                     shared.append((name, first))
         parameters.append((name, use))
+    emission, occlusion = "unused", "unused"
+    if material.emits:
+        emission = _use_of_colour(material.emission)
+    from_all_round = ambient != "none" or any(group.omnidirectional for group in groups)
+    if from_all_round and material.occlusion is not None and material.occlusion.strength:
+        occlusion = f"texture.{material.occlusion.channel}"
+    for name, use in (("emission", emission), ("occlusion", occlusion)):
+        if channel(use) is not None and (first := pictures.setdefault(_read_as(material, name), name)) != name:
+            shared.append((name, first))
     carries_alpha = material.alpha_mode != "opaque" and base is not None and isinstance(getattr(material, base), Texture)
     vertex_colours = instance.vertex_colours and (base in asked or material.alpha_mode != "opaque")
     # If alpha is the same everywhere and at least the cutoff, no fragment is cut out.
     whole = not (carries_alpha or vertex_colours) and material.alpha >= material.alpha_cutoff
     bumpy = (material.normal_map is not None or material.bump_map is not None) and bool(groups)
     tangents = material.needs_tangents and directed
-    return ProgramPlan(
+    plan = ProgramPlan(
         rate=instance.rate,
         brdf=material.brdf,
         slots=tuple(material.slots().items()) if groups or ambient == "varying" else (),
@@ -100,12 +108,32 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         direction_map=tangents and isinstance(material.tangent_direction, DirectionMap),
         normalise=instance.quality.normalise is not False or not groups or instance.rate != "phong" or bumpy or tangents,
         arithmetic=(instance.quality.arithmetic if groups else None) or "stable",
+        emission=emission,
+        occlusion=occlusion,
     )
+    return replace(plan, placed=placed(plan, material), added=added(plan, material))
+
+
+def _read_as(material: Brdf, name: str) -> tuple[Texels, Placement]:
+    """Returns the texels and the placement of a picture. Textures that agree in both are one texture of the program."""
+    return texels_of(material, name), placement_of(material, name)
+
+
+def _use_of_colour(value: Any) -> Use:
+    """Returns the use of a colour: three numbers or a texture."""
+    if isinstance(value, Texture):
+        return "texture"
+    return "grey" if is_grey(value) else "uniform"
+
+
+def _use_of_number(value: Any) -> str:
+    """Returns the use of a number or of a texture that holds a number in one channel."""
+    return f"texture.{value.channel or 'r'}" if isinstance(value, Texture) else "uniform"
 
 
 def further_plan(plan: ProgramPlan, instance: Instance, pages: Sequence[int], index: int) -> ProgramPlan:
-    """Returns the plan of a further page of lights. The first call has already drawn ambient light and groups with an exact
-    count.
+    """Returns the plan of a further page of lights. The first call has already drawn emission, ambient light and groups with an
+    exact count.
 
     plan: the plan of the first call.
     instance: the instance that is drawn.
@@ -117,7 +145,8 @@ def further_plan(plan: ProgramPlan, instance: Instance, pages: Sequence[int], in
     for group in groups:
         asked |= with_equals(instance.material, instance.material.asked("ambient" if group.omnidirectional else "light"))
     parameters = tuple((name, use if name in asked else "unused") for name, use in plan.parameters)
-    return replace(plan, lights=groups, ambient="none", parameters=parameters)
+    occlusion = plan.occlusion if any(group.omnidirectional for group in groups) else "unused"
+    return replace(plan, lights=groups, ambient="none", parameters=parameters, emission="unused", occlusion=occlusion)
 
 
 def _groups(lights: Iterable[Light]) -> tuple[LightGroup, ...]:
@@ -153,7 +182,7 @@ def _bare(instance: Instance, assembly: Assembly, encoding: Literal["linear", "s
     vertex_alpha = masked and instance.vertex_colours
     whole = not (carries_alpha or vertex_alpha) and material.alpha >= material.alpha_cutoff
     normal = instance.shows == "normal"
-    return ProgramPlan(
+    plan = ProgramPlan(
         rate=instance.rate,
         brdf=material.brdf,
         slots=(),
@@ -171,6 +200,7 @@ def _bare(instance: Instance, assembly: Assembly, encoding: Literal["linear", "s
         normal_span=texels_of(material, "bump_map").span if normal and material.bump_map else (1, 1),
         shows=instance.shows,
     )
+    return replace(plan, placed=placed(plan, material))
 
 
 def with_equals(material: Brdf, asked: frozenset[str]) -> frozenset[str]:

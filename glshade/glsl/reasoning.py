@@ -22,6 +22,10 @@ def reasons(program: ProgramPlan, instance: Instance, assembly: Assembly) -> Ite
         yield f"{program.brdf}'s {part}", name
     for parameter in program.textured:
         yield f"texture of {parameter}", name
+    if program.emission in ("uniform", "grey"):
+        yield "emission", name
+    if program.placed:
+        yield "textures placed by a matrix", f"{name}, by uv_scale, uv_rotate or uv_offset"
     if program.normal_map:
         yield "bump map" if material.bump_map else "normal map", name
     if program.direction_map:
@@ -42,7 +46,9 @@ def reasons(program: ProgramPlan, instance: Instance, assembly: Assembly) -> Ite
         yield "fast arithmetic", f"{name}, by quality.arithmetic"
     for group in program.lights:
         yield f"light {group.key}", light(next(i for i in instance.lights if group.holds(assembly.lights[i])))
-    if program.ambient != "none":
+    if material.unlit:
+        yield "base colour in place of light", f"{name}, which is unlit"
+    elif program.ambient != "none":
         yield "light ambient", light(next(i for i in instance.lights if assembly.lights[i].ignores_normal))
     if program.directed or program.sided:
         yield program.viewer, "camera"

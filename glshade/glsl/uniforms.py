@@ -14,12 +14,21 @@ from numpy.typing import NDArray
 from glshade.arrays import precision, rounded
 from glshade.assembly.assembly import Assembly
 from glshade.assembly.instance import Instance
-from glshade.assembly.values import ambient_intensity, ambient_reflectance, direction, light_values, normal_matrix
+from glshade.assembly.values import (
+    ambient_intensity,
+    ambient_reflectance,
+    direction,
+    emitted,
+    emitted_beside,
+    light_values,
+    normal_matrix,
+)
 from glshade.brdfs import Brdf
 from glshade.brdfs import parameter_values as parameter_values
 from glshade.glsl.plan import LightGroup, ProgramPlan, channel
 from glshade.lights import LIGHTS, Light
-from glshade.textures.texels import Texels, texels_of
+from glshade.textures.texels import Texels, placement_of, texels_of
+from glshade.textures.texture import UNPLACED
 
 Array = NDArray[np.float64]
 Values = dict[str, NDArray[np.float32]]
@@ -64,6 +73,16 @@ def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
         values["u_normal_scale"] = material.bump_map.height if material.bump_map else material.normal_map.scale
     if plan.turned:
         values["u_turn"] = direction(material)
+    if plan.occlusion != "unused":
+        values["u_occlusion"] = material.occlusion.strength
+    for name in plan.added:
+        number = getattr(material, name).add
+        # The light that a surface emits is exposed, so that `exposed_uniforms` has what is added to it.
+        if name != "emission":
+            values[f"u_{name}_add"] = number if type(material).is_colour(name) else number[0]
+    for sampler, key in pictures(plan, material).items():
+        if sampler in plan.placed:
+            values[f"{sampler}_across"], values[f"{sampler}_up"] = placement_of(material, key)
     if plan.alpha != "opaque":
         values["u_alpha"] = material.alpha
     if plan.alpha == "mask":
@@ -73,20 +92,48 @@ def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
 
 def textures(plan: ProgramPlan, material: Brdf) -> dict[str, Texels]:
     """Sampler name -> texels, for every texture that the program reads."""
-    texels = {f"u_{plan.picture_of(name)}_texture": texels_of(material, name) for name in plan.textured}
+    return {sampler: texels_of(material, key) for sampler, key in pictures(plan, material).items()}
+
+
+def pictures(plan: ProgramPlan, material: Brdf) -> dict[str, str]:
+    """Sampler name -> the material's key that holds the picture, for every texture that the program reads."""
+    keys = {f"u_{plan.picture_of(name)}_texture": name for name in plan.textured}
     if plan.alpha_from:
-        texels[f"u_{plan.alpha_from}_texture"] = texels_of(material, plan.alpha_from)
+        keys[f"u_{plan.alpha_from}_texture"] = plan.alpha_from
     if plan.normal_map:
-        texels["u_normal_map"] = texels_of(material, "bump_map" if material.bump_map else "normal_map")
+        keys["u_normal_map"] = "bump_map" if material.bump_map else "normal_map"
     if plan.direction_map:
-        texels["u_direction_map"] = texels_of(material, "tangent_direction")
-    return texels
+        keys["u_direction_map"] = "tangent_direction"
+    return keys
 
 
-def ambient_radiance(instance: Instance, assembly: Assembly, exposure: float) -> Values:
-    """Returns the uniform with the ambient light (3,) that a surface reflects, if its ambient reflectance is constant."""
-    intensity = ambient_intensity(assembly, instance.lights, exposure)
-    return {"u_ambient_radiance": rounded(ambient_reflectance(instance.material) * intensity)}
+def added(plan: ProgramPlan, material: Brdf) -> tuple[str, ...]:
+    """Returns the textured parameters, and emission, to whose texels the material adds a number."""
+    return tuple(name for name in plan.textured if any(getattr(getattr(material, name), "add", ())))
+
+
+def placed(plan: ProgramPlan, material: Brdf) -> tuple[str, ...]:
+    """Returns the samplers of the textures that the material's keys place by a matrix."""
+    return tuple(sampler for sampler, key in pictures(plan, material).items() if placement_of(material, key) != UNPLACED)
+
+
+def exposed_uniforms(plan: ProgramPlan, instance: Instance, assembly: Assembly, exposure: float) -> Values:
+    """Returns the uniforms with the light that a surface shows whatever its normal: u_ambient_radiance, the ambient light (3,)
+    that it reflects, if its ambient reflectance is constant, and u_emission, the light that it emits or the factor of the
+    emission's texture.
+
+    exposure: the film's exposure [stops].
+    """
+    values: Values = {}
+    if plan.ambient == "constant":
+        intensity = ambient_intensity(assembly, instance.lights, exposure)
+        values["u_ambient_radiance"] = rounded(ambient_reflectance(instance.material) * intensity)
+    if plan.emission != "unused":
+        emission = emitted(instance, exposure)
+        values["u_emission"] = emission[0] if plan.emission == "grey" else emission
+    if "emission" in plan.added:
+        values["u_emission_add"] = emitted_beside(instance, exposure)
+    return values
 
 
 def light_uniforms(plan: ProgramPlan, assembly: Assembly, chosen: tuple[int, ...], exposure: float) -> Values:

@@ -111,6 +111,9 @@ def _knobs(model: type[Brdf], kinds: int) -> dict[str, int]:
         "direction_map": 2,
         "normalise": 2,
         "arithmetic": 2,
+        # Unused, one number, three numbers or a texture; unused or one of a texture's four channels.
+        "emission": 4,
+        "occlusion": 5,
     }
 
 
@@ -136,8 +139,10 @@ def valid(model: type[Brdf], kinds: int) -> int:
             and (tangents or not (turned or mapped))
             and (normalised or not (bumpy or tangents))
         )
-        # Two viewers and two encodings go with each combination.
-        total += lights * surfaces * 2 * 2 * options * _uses(model, directed, ambient, alpha != "opaque", carried, coloured)
+        # Two viewers, two encodings and four uses of emission go with each combination, and with ambient light also the uses of
+        # occlusion.
+        shown = 2 * 2 * 4 * (1 if ambient == "none" else 5)
+        total += lights * surfaces * shown * options * _uses(model, directed, ambient, alpha != "opaque", carried, coloured)
     return total
 
 

@@ -122,23 +122,26 @@ class Surfaces:
         return np.where(same[:, None], self.light, light)
 
     def parts(self) -> tuple[Array, Array]:
-        """Returns (all light, specular light), (L, K, 3) each: what each of the L lights adds to the pixels."""
+        """Returns (all light, specular light), (L + 1, K, 3) each: what each of the L lights adds to the pixels, and last what
+        the surfaces emit.
+        """
         lights = len(self.assembly.lights)
-        every, specular = (np.zeros((lights, len(self.pixel), 3)) for _ in range(2))
+        every, specular = (np.zeros((lights + 1, len(self.pixel), 3)) for _ in range(2))
         for number, which, part in self._by_draw():
-            draw = self.inputs.draws[number]
+            draw, at = self.inputs.draws[number], self.place[which]
             shiny = self._specular(draw)
+            if draw.emission.any():
+                every[lights, at] = shade(self.inputs, number, replace(draw, lamps=(), surrounds=(), ambient=np.zeros(3)), part)
             for light in draw.instance.lights:
                 alone = self._lit_by(draw, light)
-                at = self.place[which]
                 every[light, at] = shade(self.inputs, number, alone, part)
                 if shiny is not None and alone.lamps:
                     specular[light, at] = shade(self.inputs, number, self._lit_by(shiny, light), part)
         return every, specular
 
     def _lit_by(self, draw: Draw, light: int) -> Draw:
-        """Returns a draw with one of its lights only, an index in the assembly's lights."""
-        kinds = self.assembly.lights
+        """Returns a draw with one of its lights only, an index in the assembly's lights, and without emission."""
+        kinds, draw = self.assembly.lights, replace(draw, emission=np.zeros(3))
         if kinds[light].ignores_normal:
             ambient = wide(ambient_intensity(self.assembly, (light,), self.scene.film.exposure))
             return replace(draw, lamps=(), surrounds=(), ambient=ambient)

@@ -7,9 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
 from glshade.errors import AssetError, GlshadeError
-from glshade.files import replacing
+from glshade.files import read_bytes, replacing
+from glshade.image.chunks import check_chunks
 from glshade.image.contents import Part, PictureContents
 from glshade.image.formats import FORMATS, PictureFormat
+from glshade.limits import LARGEST_MESH
 
 if TYPE_CHECKING:
     import numpy as np
@@ -110,6 +112,22 @@ def probe(path: str | Path) -> None:
     """Reads a file's header alone. Errors: AssetError where the file cannot be read as a picture."""
     try:
         _format_to_read(path).attributes(Path(path))
+    except OSError as error:
+        raise _unreadable(path, error) from None
+
+
+def check_stored(path: str | Path) -> None:
+    """Checks a picture file for damage that can be found without decoding it. Errors: AssetError."""
+    try:
+        check_chunks(read_bytes(path, LARGEST_MESH))
+    except OSError as error:
+        raise _unreadable(path, error) from None
+
+
+def check(path: str | Path) -> None:
+    """Decodes a picture, and keeps nothing of it. Errors: AssetError where the file cannot be read as a picture."""
+    try:
+        _format_to_read(path).read(Path(path))
     except OSError as error:
         raise _unreadable(path, error) from None
 

@@ -24,6 +24,7 @@ AOVS = (
     "albedo",
     "diffuse",
     "specular",
+    "emission",
     "lights",
     "background",
     "object_id",

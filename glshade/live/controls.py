@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from glshade.brdfs import BRDFS, Brdf
+from glshade.brdfs import BRDFS, EMISSION, Brdf
 from glshade.document import Document
 from glshade.presets import PRESETS
 from glshade.scene.object import Object
@@ -102,8 +102,8 @@ def _materials(scene: Scene) -> Iterator[Table]:
 
 
 def _parameters(key: str, material: Brdf) -> Iterator[Table]:
-    """Yields a field for each parameter of a material's model. A texture can be multiplied by a factor."""
-    for name, declared in material.parameters().items():
+    """Yields a field for each parameter of a material's model, and for emission. A texture can be multiplied by a factor."""
+    for name, declared in {**material.parameters(), "emission": EMISSION}.items():
         value = getattr(material, name)
         if value is None and declared.same_as:
             value = getattr(material, declared.same_as)
@@ -127,8 +127,9 @@ def _lights(scene: Scene) -> Iterator[Table]:
 
 
 def _fields(key: str, document: Document) -> Iterator[Table]:
-    """Yields a field for each value of a table that a page can change. A material's parameters are left out."""
-    parameters = document.parameters() if isinstance(document, Brdf) else {}
+    """Yields a field for each value of a table that a page can change. A material's parameters and emission are left out.
+    """
+    parameters = {*document.parameters(), "emission"} if isinstance(document, Brdf) else set()
     for name, info in type(document).model_fields.items():
         if name not in HIDDEN and name not in parameters:
             yield from _field(key, name, info, getattr(document, name))

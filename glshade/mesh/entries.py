@@ -34,6 +34,7 @@ def recall(folder: Path) -> Contents | None:
         stored = json.loads(data)
         contents = Contents()
         contents.parts, contents.warnings = stored["parts"], stored["warnings"]
+        contents.cameras, contents.lights = stored["cameras"], stored["lights"]
         contents.dependencies = stored["dependencies"]
         if any(_state(Path(file), state) != state for file, state in contents.dependencies.items()):
             return None
@@ -99,6 +100,8 @@ def _write(contents: Contents, folder: Path) -> None:
     entry = {
         "meshes": meshes,
         "parts": contents.parts,
+        "cameras": contents.cameras,
+        "lights": contents.lights,
         "images": {name: _checksum(data) for name, data in contents.images.items()},
         "dependencies": contents.dependencies,
         "warnings": contents.warnings,

@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from glshade.arrays import Float32, Float64
+from glshade.mesh.frames import brushed
+from glshade.mesh.geometry import blocks
 from glshade.mesh.mesh import Mesh
 from glshade.mesh.normals import with_normals
-from glshade.mesh.tangents import brushed
 from glshade.mesh.welding import normalised
 
 
@@ -23,28 +24,32 @@ def faceted(mesh: Mesh) -> Mesh:
     split = with_normals(mesh, "face", 0.0)
     assert split.normals is not None
 
-    def mean(array: Float32 | None) -> Float64 | None:
-        if array is None:
-            return None
-        return np.repeat(array.astype(np.float64)[mesh.triangles].mean(axis=1), 3, axis=0)
-
-    def single(array: Float64 | None) -> Float32 | None:
-        return None if array is None else array.astype(np.float32)
+    def mean(array: Float32 | None) -> Float32 | None:
+        """Returns the mean of each triangle's values, at each of its corners (3T, n)."""
+        return None if array is None else np.repeat(_means(mesh, array).astype(np.float32), 3, axis=0)
 
     tangents = None
     if mesh.tangents is not None:
-        n = split.normals.astype(np.float64)
-        mean_t = mean(mesh.tangents[:, :3])
-        assert mean_t is not None
+        n = split.normals[::3].astype(np.float64)
+        mean_t = _means(mesh, mesh.tangents[:, :3])
         t, length = normalised(mean_t - n * np.einsum("ij,ij->i", n, mean_t)[:, None])
-        w = np.repeat(mesh.tangents[mesh.triangles[:, 0], 3], 3)
+        w = mesh.tangents[mesh.triangles[:, 0], 3]
         lost = length < 1e-6
         t[lost], w[lost] = brushed(n[lost]), 1.0
-        tangents = np.column_stack([t, w]).astype(np.float32)
+        tangents = np.repeat(np.column_stack([t, w]).astype(np.float32), 3, axis=0)
     return replace(
         split,
         tangents=tangents,
-        centroids=single(mean(mesh.positions)),
-        centroid_uvs=single(mean(mesh.uvs)),
-        centroid_colours=single(mean(mesh.colours)),
+        centroids=mean(mesh.positions),
+        centroid_uvs=mean(mesh.uvs),
+        centroid_colours=mean(mesh.colours),
     )
+
+
+def _means(mesh: Mesh, values: Float32) -> Float64:
+    """Returns the mean (T, n) of the values (V, n) at the three corners of each triangle."""
+    result = np.empty((len(mesh.triangles), values.shape[1]))
+    for block in blocks(len(result)):
+        a, b, c = values.take(mesh.triangles[block].T, axis=0).astype(np.float64)
+        result[block] = (a + b + c) / 3
+    return result

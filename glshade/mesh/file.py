@@ -13,6 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from glshade.errors import AssetError
+from glshade.errors import AssetWarning as AssetWarning
 from glshade.files import read_bytes, user_cache
 from glshade.limits import DEFAULT, LARGEST_MESH, Limits
 from glshade.lru import WeakLru
@@ -23,7 +24,7 @@ from glshade.mesh.model import Model, model_of, stamps
 from glshade.mesh.reading.file import MeshFile
 
 # Raise this number when a reader changes so that the same file gives another model: older cache entries are then ignored.
-LOADER_VERSION = 4
+LOADER_VERSION = 5
 # Models that nobody refers to stay in memory up to this total size [bytes]. The newest model stays in any case.
 REMEMBERED = 32 << 20
 # A model keeps alive about this many times the bytes of its arrays: the meshes that are made from it for drawing, and their
@@ -33,10 +34,6 @@ DRAWN = 5
 # The models that this process loaded. The key holds the absolute path of the file and everything else that decides which
 # other files it may name.
 _memory: WeakLru[tuple[Path, bool, frozenset[Path]], Model] = WeakLru(REMEMBERED)
-
-
-class AssetWarning(UserWarning):
-    """A file that a mesh file names is missing, or something in the file is not used; the mesh is drawn without it."""
 
 
 def load(path: Path, limits: Limits = DEFAULT, folders: frozenset[Path] = frozenset()) -> Model:

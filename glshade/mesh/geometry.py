@@ -1,12 +1,14 @@
-"""Geometry: bounding boxes, areas, angles and normals of triangles, computed in float64."""
+"""Geometry: bounding boxes, origins, areas, angles and normals of triangles, computed in float64."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Protocol
 
 import numpy as np
 
 from glshade.arrays import Array, Float32, Float64, Int64, UInt32
+from glshade.errors import AssetError
 from glshade.mesh.welding import normalised
 
 
@@ -28,14 +30,27 @@ def box(p: Array) -> tuple[Array, Array]:
     return np.array([x.min() for x in columns]), np.array([x.max() for x in columns])
 
 
-def by_corner(mesh: Triangles, centre: Float64 | float = 0.0) -> list[list[Float64]]:
-    """Returns the three corners of all triangles, each as a list of its coordinates x, y and z (T,) relative to `centre`.
+# The number of triangles whose coordinates are computed at a time. Their arrays fit into a processor's cache, which is several
+# times as fast as arrays of all triangles, and takes no memory that grows with the mesh.
+BLOCK = 1 << 15
 
-    The result is nine arrays instead of one of shape (T, 3, 3), because NumPy is many times as fast along an axis of a million
-    elements as along one of three.
+
+def blocks(count: int) -> Iterator[slice]:
+    """Yields slices of BLOCK elements, which cover 0 to count - 1."""
+    return (slice(first, min(first + BLOCK, count)) for first in range(0, count, BLOCK))
+
+
+def by_corner(mesh: Triangles, centre: Float64 | None = None) -> Iterator[tuple[slice, list[list[Float64]]]]:
+    """Yields the three corners of the triangles, each as a list of its coordinates x, y and z relative to `centre`.
+
+    The triangles come in blocks, each with the slice of its triangles. A block is nine arrays instead of one of shape (n, 3,
+    3), because NumPy is many times as fast along an axis of many elements as along one of three.
     """
-    p = np.ascontiguousarray((mesh.positions.astype(np.float64) - centre).T)
-    return [[p[axis][corner] for axis in range(3)] for corner in mesh.triangles.astype(np.intp).T]
+    columns = [np.ascontiguousarray(column) for column in mesh.positions.T]
+    offset = np.zeros(3) if centre is None else centre
+    for block in blocks(len(mesh.triangles)):
+        corners = mesh.triangles[block].astype(np.intp).T
+        yield block, [[p.take(c).astype(np.float64) - o for p, o in zip(columns, offset, strict=True)] for c in corners]
 
 
 # The normal of a vertex whose triangles all have no area. No pixel shows such a vertex, but values are evaluated there, and a
@@ -49,10 +64,12 @@ def face_normals(mesh: Triangles) -> Float64:
     The normal of a triangle without area is (0, 0, 0).
     """
     n = area_vectors(mesh)
-    with np.errstate(over="ignore"):
-        length = np.sqrt(np.einsum("ij,ij->i", n, n))
-    length[(length == 0) | ~np.isfinite(length)] = np.inf
-    n /= length[:, None]
+    for block in blocks(len(n)):
+        part = n[block]
+        with np.errstate(over="ignore"):
+            length = np.sqrt(np.einsum("ij,ij->i", part, part))
+        length[(length == 0) | ~np.isfinite(length)] = np.inf
+        part /= length[:, None]
     return n
 
 
@@ -62,25 +79,29 @@ def area_vectors(mesh: Triangles) -> Float64:
     The edges need no scaling before their cross product, unlike in a shader: the fourth power of an edge between float32
     positions neither overflows nor vanishes in float64.
     """
-    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = by_corner(mesh)
-    x1, y1, z1 = bx - ax, by - ay, bz - az
-    x2, y2, z2 = cx - ax, cy - ay, cz - az
-    result = np.empty((len(ax), 3))
-    result[:, 0] = y1 * z2 - z1 * y2
-    result[:, 1] = z1 * x2 - x1 * z2
-    result[:, 2] = x1 * y2 - y1 * x2
+    result = np.empty((len(mesh.triangles), 3))
+    for block, corners in by_corner(mesh):
+        result[block] = np.stack(_cross(corners), axis=1)
     return result
 
 
 def corner_angles(mesh: Triangles) -> Float64:
     """Returns (T, 3) angles at the corners [rad]. They come from atan2, which is exact for very thin triangles too."""
-    p = by_corner(mesh)
-    area = np.linalg.norm(area_vectors(mesh), axis=1)
-    angles = np.empty((len(area), 3))
-    for k in range(3):
-        (x, y, z), (x1, y1, z1), (x2, y2, z2) = p[k], p[k - 2], p[k - 1]
-        angles[:, k] = np.arctan2(area, (x1 - x) * (x2 - x) + (y1 - y) * (y2 - y) + (z1 - z) * (z2 - z))
+    angles = np.empty((len(mesh.triangles), 3))
+    for block, p in by_corner(mesh):
+        area = np.sqrt(sum(n * n for n in _cross(p)))
+        for k in range(3):
+            (x, y, z), (x1, y1, z1), (x2, y2, z2) = p[k], p[k - 2], p[k - 1]
+            angles[block, k] = np.arctan2(area, (x1 - x) * (x2 - x) + (y1 - y) * (y2 - y) + (z1 - z) * (z2 - z))
     return angles
+
+
+def _cross(corners: list[list[Float64]]) -> list[Float64]:
+    """Returns the cross product of two edges of each triangle, as a list of its coordinates. corners: as in `by_corner`."""
+    (ax, ay, az), (bx, by, bz), (cx, cy, cz) = corners
+    x1, y1, z1 = bx - ax, by - ay, bz - az
+    x2, y2, z2 = cx - ax, cy - ay, cz - az
+    return [y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2]
 
 
 def sum_by_label(values: Float64, label: Int64, count: int) -> Float64:
@@ -88,21 +109,53 @@ def sum_by_label(values: Float64, label: Int64, count: int) -> Float64:
     return np.stack([np.bincount(label, weights=values[:, k], minlength=count) for k in range(3)], axis=1)
 
 
-def smooth_by_label(mesh: Triangles, label: Int64, count: int) -> Float64:
+def smooth_by_label(mesh: Triangles, label: Int64, count: int, faces: Float64 | None = None) -> Float64:
     """Returns unit normals (count, 3). Row i is the mean of the triangles' normals, weighted by angle, over the corners (3T,)
     whose label is i.
 
+    faces: the normals (T, 3) of the triangles, where the caller has them already.
+
     Where the normals cancel out, the result is the normal of one of the triangles, or FALLBACK_NORMAL if all have no area.
     """
-    n = face_normals(mesh)
-    angle = corner_angles(mesh).reshape(-1)
-    corner = np.repeat(n, 3, axis=0)
-    result, length = normalised(sum_by_label(corner * angle[:, None], label, count))
+    n = face_normals(mesh) if faces is None else faces
+    angle = corner_angles(mesh)
+    total = np.empty((count, 3))
+    for axis in range(3):
+        total[:, axis] = np.bincount(label, weights=(angle * n[:, axis, None]).reshape(-1), minlength=count)
+    result, length = normalised(total)
     # If the mean of a few unit vectors is shorter than 1e-7, it consists of rounding errors of float32 positions.
-    lost = length <= 1e-7 * np.bincount(label, weights=angle, minlength=count)
+    lost = length <= 1e-7 * np.bincount(label, weights=angle.reshape(-1), minlength=count)
     if lost.any():
         stand_in = np.tile(np.array(FALLBACK_NORMAL), (count, 1))
-        useful = np.flatnonzero(lost[label] & corner.any(axis=1))[::-1]
-        stand_in[label[useful]] = corner[useful]
+        useful = np.flatnonzero(lost[label] & np.repeat(n.any(axis=1), 3))[::-1]
+        stand_in[label[useful]] = n[useful // 3]
         result[lost] = stand_in[lost]
     return result
+
+
+def in_use(positions: Float32, *indices: UInt32 | None) -> Float32:
+    """Returns the positions (U, 3) of the vertices that the indices name; all of them (V, 3) where no vertex is left out."""
+    used = np.zeros(len(positions), dtype=np.bool_)
+    for some in indices:
+        if some is not None:
+            used[some.reshape(-1)] = True
+    return positions if used.all() else positions[used]
+
+
+def centred(p: Array) -> tuple[Float64, Array]:
+    """Returns the origin (3,) for positions p (V, 3), and the positions relative to it.
+
+    The origin is the centre of the bounding box if that is farther from 0 than the box's diagonal is long, and otherwise 0.
+    Errors: AssetError for positions that are too large for float32.
+    """
+    low, high = (corner.astype(np.float64) for corner in box(p))
+    centre = low / 2 + high / 2  # the sum of two large numbers might overflow, so both are halved first
+    with np.errstate(over="ignore"):
+        far = np.linalg.norm(centre) > np.linalg.norm(high - low)
+    if far:
+        p = p.astype(np.float64) - centre
+        low, high = box(p)
+    reach = max(np.abs(low).max(), np.abs(high).max())
+    if reach > np.finfo(np.float32).max:
+        raise AssetError(f"positions reach {reach:g}, too large for float32")
+    return (centre if far else np.zeros(3)), p

@@ -7,6 +7,7 @@ are float32, because both renderers are given these bytes. Intermediate sums and
 from __future__ import annotations
 
 import hashlib
+import warnings
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
@@ -15,9 +16,11 @@ import numpy as np
 import numpy.typing as npt
 
 from glshade.arrays import Array, Float32, Float64, UInt32
-from glshade.errors import AssetError
-from glshade.mesh.checking import indices, matrix, row
-from glshade.mesh.geometry import box, by_corner, smooth_by_label
+from glshade.errors import AssetError, AssetWarning
+from glshade.mesh.checking import Arrays, Faults, checked, nothing_finite
+from glshade.mesh.fans import of_one_group, split
+from glshade.mesh.frames import framed
+from glshade.mesh.geometry import Triangles, box, by_corner, centred, in_use, smooth_by_label
 from glshade.mesh.welding import normalised, weld
 
 # The number of columns of each optional array.
@@ -47,6 +50,10 @@ class Mesh:
     centroids: (V, 3) float32, the mean position of the triangle to which the vertex belongs. Only `faceted` sets the means.
     centroid_uvs: (V, 2) float32, the mean uvs of that triangle.
     centroid_colours: (V, 4) float32, the mean colour of that triangle.
+    neighbours: (N, 3, 3) float32, the corners of triangles that belong to other parts of the same surface and touch this mesh,
+        relative to `origin`. They are not drawn, but normals are smooth across the border to them.
+    strokes: (S, 2) uint32, the lines of a mesh of points and lines, which has no triangles; None for a mesh of triangles. A
+        line joins two vertices; a line from a vertex to itself is a point. A normal may be zero there, which stands for none.
 
     Errors: AssetError for arrays whose shapes do not match.
     """
@@ -61,6 +68,8 @@ class Mesh:
     centroids: Float32 | None = None
     centroid_uvs: Float32 | None = None
     centroid_colours: Float32 | None = None
+    strokes: UInt32 | None = None
+    neighbours: Float32 | None = None
 
     def __post_init__(self) -> None:
         def settle(name: str, dtype: type[Any], columns: int) -> None:
@@ -71,13 +80,18 @@ class Mesh:
 
         settle("positions", np.float32, 3)
         settle("triangles", np.uint32, 3)
+        if self.strokes is not None:
+            settle("strokes", np.uint32, 2)
         for name, columns in _COLUMNS.items():
             if getattr(self, name) is not None:
                 settle(name, np.float32, columns)
                 if len(getattr(self, name)) != len(self.positions):
                     raise AssetError(f"mesh has {len(self.positions)} positions and {len(getattr(self, name))} {name}")
-        if len(self.triangles) and int(self.triangles.max()) >= len(self.positions):
-            raise AssetError(f"triangle index {self.triangles.max()} is out of range: {len(self.positions)} vertices")
+        if self.neighbours is not None:
+            object.__setattr__(self, "neighbours", _own(np.array(self.neighbours, np.float32, order="C", copy=None)))
+        for name, rows in (("triangle", self.triangles), ("line", self.strokes)):
+            if rows is not None and len(rows) and int(rows.max()) >= len(self.positions):
+                raise AssetError(f"{name} index {rows.max()} is out of range: {len(self.positions)} vertices")
         object.__setattr__(self, "origin", _own(np.array(self.origin, dtype=np.float64).reshape(3)))
 
     @classmethod
@@ -88,61 +102,90 @@ class Mesh:
         normals: npt.ArrayLike | None = None,
         uvs: npt.ArrayLike | None = None,
         colours: npt.ArrayLike | None = None,
+        *,
+        smoothing: npt.ArrayLike | None = None,
+        tangents: npt.ArrayLike | None = None,
     ) -> Mesh:
         """Checks arrays and returns a mesh made from them.
 
-        positions: (V, 3).
+        positions: (V, 3). Vertices that no triangle uses are left out.
         triangles: (T, 3) integers, counter-clockwise seen from outside.
         normals: (V, 3) of any length. A zero, infinite or NaN normal is replaced by the smooth normal of its vertex.
         uvs: (V, 2); v = 0 is the bottom of the picture.
         colours: (V, 4), linear Rec. 709 with straight alpha.
+        smoothing: (T,) integers, for a mesh without normals. It gets normals that are smooth among the triangles with equal
+            numbers, whatever their angles, and sharp between others; a triangle with the number 0 is flat.
+        tangents: (V, 4), for a mesh with normals: directions of any length, and a number whose sign is that of the bitangent.
+            A tangent without a direction across its normal is replaced by that of `brushed`.
 
         The origin of the mesh becomes the centre of the bounding box if that centre is farther from 0 than the box's diagonal
         is long. Otherwise the origin is 0, and positions that were float32 keep their exact bytes.
 
-        Errors: AssetError for a mesh without triangles, an array of a wrong shape, an infinity or a NaN, a position too large
-        for float32, or an index out of range.
+        Triangles with an infinite or NaN position are left out, infinite and NaN uvs become 0, and such colours white. Warns
+        with AssetWarning, with the numbers of triangles and vertices.
+
+        Errors: AssetError for a mesh without triangles whose positions are finite, an array of a wrong shape, a position too
+        large for float32, or an index out of range.
         """
-        p = matrix(positions, 3, "positions")
-        t = indices(triangles, len(p))
-        if not np.isfinite(p).all():
-            bad = int(np.flatnonzero(~np.isfinite(p).all(axis=1))[0])
-            raise AssetError(f"vertex {bad} (of {len(p)}, from 0) is not finite: {row(p[bad])}")
-        low, high = box(p)
-        centre = low / 2 + high / 2  # the sum of two large numbers might overflow, so both are halved first
-        with np.errstate(over="ignore"):
-            far = np.linalg.norm(centre) > np.linalg.norm(high - low)
-        origin = centre if far else np.zeros(3)
-        p = p - origin
-        if np.abs(p).max() > np.finfo(np.float32).max:
-            raise AssetError(f"positions reach {np.abs(p).max():g}, too large for float32")
+        faults = Faults()
+        arrays = checked(positions, triangles, normals, uvs, colours, smoothing=smoothing, tangents=tangents, faults=faults)
+        if arrays is None:
+            raise AssetError(nothing_finite(faults))
+        for line in faults.lines():
+            warnings.warn(line, AssetWarning, stacklevel=2)
+        return cls.of_arrays(arrays, *centred(arrays.positions))
 
-        def optional(array: npt.ArrayLike | None, columns: int, name: str) -> Float32 | None:
-            if array is None:
-                return None
-            return matrix(array, columns, name).astype(np.float32)
+    @classmethod
+    def of_arrays(
+        cls, arrays: Arrays, origin: Float64, relative: Array, neighbours: Float32 | None = None, groups: Array | None = None
+    ) -> Mesh:
+        """Returns the mesh of arrays that were checked.
 
+        origin: the origin (3,) of the mesh.
+        relative: (V, 3) the positions relative to the origin.
+        neighbours: as in `Mesh`.
+        groups: (N,) the smoothing groups of the neighbours.
+        """
         mesh = cls(
-            positions=p.astype(np.float32),
-            triangles=t,
-            uvs=optional(uvs, 2, "uvs"),
-            colours=optional(colours, 4, "colours"),
+            positions=relative.astype(np.float32, copy=False),
+            triangles=arrays.triangles,
+            uvs=arrays.uvs,
+            colours=arrays.colours,
             origin=origin,
+            neighbours=neighbours,
         )
-        for name in ("uvs", "colours"):
-            given = getattr(mesh, name)
-            if given is not None and not np.isfinite(given).all():
-                raise AssetError(f"{name} hold values that are not finite")
-        if normals is None:
+        if arrays.normals is not None:
+            return mesh._with_given(arrays.normals, arrays.tangents)
+        if arrays.smoothing is None:
             return mesh
-        n, length = normalised(matrix(normals, 3, "normals"))
-        if len(n) != len(p):
-            raise AssetError(f"mesh has {len(p)} positions and {len(n)} normals")
+        numbers = arrays.smoothing if groups is None else np.concatenate([arrays.smoothing, groups])
+        attributes = [a for a in (mesh.uvs, mesh.colours) if a is not None]
+        made = split(mesh.with_neighbours(), attributes, len(mesh.triangles), lambda _: of_one_group(numbers))
+        return gather(mesh, made.source, made.corners, normals=made.normals)
+
+    def _with_given(self, normals: Float64, tangents: Float64 | None) -> Mesh:
+        """Returns the mesh with the normals (V, 3) and tangents (V, 4) of a file, made unit and perpendicular.
+
+        Normals without a direction become smooth normals.
+        """
+        n, length = normalised(normals)
         lost = length == 0
         if lost.any():
-            label = weld(mesh.positions)
-            n[lost] = smooth_by_label(mesh, label[mesh.triangles.reshape(-1)], int(label.max()) + 1)[label[lost]]
-        return replace(mesh, normals=n.astype(np.float32))
+            label = weld(self.positions)
+            n[lost] = smooth_by_label(self, label[self.triangles.reshape(-1)], int(label.max()) + 1)[label[lost]]
+        frame = None if tangents is None else framed(n, tangents[:, :3], np.where(tangents[:, 3] < 0, -1.0, 1.0))
+        return replace(self, normals=n.astype(np.float32), tangents=frame, neighbours=None)
+
+    def with_neighbours(self) -> Triangles:
+        """Returns the positions and triangles of the mesh, with its neighbours behind them."""
+        if self.neighbours is None:
+            return self
+        more = np.arange(3 * len(self.neighbours), dtype=np.uint32).reshape(-1, 3) + np.uint32(len(self.positions))
+        return Mesh(
+            np.concatenate([self.positions, self.neighbours.reshape(-1, 3)]),
+            np.concatenate([self.triangles, more]),
+            origin=self.origin,
+        )
 
     @cached_property
     def digest(self) -> str:
@@ -163,8 +206,13 @@ class Mesh:
 
     @cached_property
     def bounds(self) -> Float64:
-        """(2, 3) float64, the least and the greatest corner of the bounding box in object space."""
-        return np.stack(box(self.positions)).astype(np.float64) + self.origin
+        """(2, 3) float64, the least and the greatest corner of the box round the vertices in use, in object space."""
+        return np.stack(box(self.drawn)).astype(np.float64) + self.origin
+
+    @property
+    def drawn(self) -> Float32:
+        """The positions (U, 3) of the vertices that triangles or lines use, relative to the origin."""
+        return in_use(self.positions, self.triangles, self.strokes)
 
     @cached_property
     def is_solid(self) -> bool:
@@ -173,21 +221,36 @@ class Mesh:
         Vertices at exactly equal positions count as one, and triangles with two such corners do not count. The mesh is solid
         if every directed edge occurs once, its reverse occurs once, and the signed volume is positive.
         """
-        place = weld(self.positions)
-        a, b, c = (place[corner] for corner in self.triangles.astype(np.intp).T)
-        flat = (a == b) | (b == c) | (c == a)
-        if flat.any():
-            a, b, c = a[~flat], b[~flat], c[~flat]
-        tail, head = np.concatenate([a, b, c]), np.concatenate([b, c, a])
-        edge = weld((np.minimum(tail, head) << 32 | np.maximum(tail, head))[:, None])
-        # If there are as many directed edges as sides of triangles, and every directed edge occurs, each occurs exactly once.
-        sides = np.bincount(edge << 1 | (tail < head), minlength=1)
-        if len(sides) != len(edge) or not sides.all():
+        # Fewer triangles than those of a tetrahedron enclose nothing.
+        if len(self.triangles) < 4 or not _is_closed(weld(self.positions).astype(np.int32).take(self.triangles)):
             return False
-        (x1, y1, z1), (x2, y2, z2), (x3, y3, z3) = by_corner(self, self.positions.mean(axis=0, dtype=np.float64))
-        terms = x1 * (y2 * z3 - z2 * y3) + y1 * (z2 * x3 - x2 * z3) + z1 * (x2 * y3 - y2 * x3)
+        total, size = 0.0, 0.0
+        for _, ((x1, y1, z1), (x2, y2, z2), (x3, y3, z3)) in by_corner(self, self.bounds.mean(axis=0) - self.origin):
+            terms = x1 * (y2 * z3 - z2 * y3) + y1 * (z2 * x3 - x2 * z3) + z1 * (x2 * y3 - y2 * x3)
+            total, size = total + float(terms.sum()), size + float(np.abs(terms).sum())
         # A sheet folded onto itself is closed too, but its volume consists of rounding errors.
-        return bool(terms.sum() > 1e-12 * np.abs(terms).sum())
+        return total > 1e-12 * size
+
+
+def _is_closed(places: Array) -> bool:
+    """Returns whether every directed edge occurs once, and its reverse occurs once.
+
+    places: (T, 3) int32, the label of the position of each corner. Triangles with two equal labels do not count.
+    """
+    flat = places.reshape(-1) == places[:, [1, 2, 0]].reshape(-1)
+    if flat.any():
+        places = places[~flat.reshape(-1, 3).any(axis=1)]
+    tail, head = places.reshape(-1), places[:, [1, 2, 0]].reshape(-1)
+    if len(tail) % 2 or not len(tail):
+        return False
+    # The lowest bit is the direction. Of a sorted list, each two neighbours must then be the two directions of one edge.
+    key = np.minimum(tail, head).astype(np.uint64)
+    key <<= np.uint64(32)
+    key |= np.maximum(tail, head).astype(np.uint64) << np.uint64(1)
+    key |= tail < head
+    key.sort()
+    paired = not (key[0::2] & np.uint64(1)).any() and np.array_equal(key[0::2] | np.uint64(1), key[1::2])
+    return paired and bool((key[2::2] != key[:-2:2]).all())
 
 
 def _own(array: Array) -> Array:
@@ -202,10 +265,11 @@ def _own(array: Array) -> Array:
     return array
 
 
-def gather(mesh: Mesh, source: Array, corners: Array, normals: Float64 | None = None) -> Mesh:
+def gather(mesh: Mesh, source: Array, corners: Array, normals: Array | None = None) -> Mesh:
     """Returns a mesh whose vertex i is vertex source[i] (V,) of the given mesh, with the triangles `corners` (3T,).
 
     normals: optional new normals (V, 3). If they are given, the tangents are dropped, because those belong to the old normals.
+        The neighbours are dropped too, because only the search for normals needs them.
     """
 
     def take(array: Float32 | None) -> Float32 | None:
@@ -213,8 +277,8 @@ def gather(mesh: Mesh, source: Array, corners: Array, normals: Float64 | None = 
 
     return Mesh(
         positions=mesh.positions.take(source, axis=0),
-        triangles=corners.astype(np.uint32).reshape(-1, 3),
-        normals=take(mesh.normals) if normals is None else normals.astype(np.float32),
+        triangles=corners.astype(np.uint32, copy=False).reshape(-1, 3),
+        normals=take(mesh.normals) if normals is None else normals.astype(np.float32, copy=False),
         uvs=take(mesh.uvs),
         tangents=take(mesh.tangents) if normals is None else None,
         colours=take(mesh.colours),
@@ -222,4 +286,5 @@ def gather(mesh: Mesh, source: Array, corners: Array, normals: Float64 | None = 
         centroids=take(mesh.centroids),
         centroid_uvs=take(mesh.centroid_uvs),
         centroid_colours=take(mesh.centroid_colours),
+        neighbours=mesh.neighbours if normals is None else None,
     )

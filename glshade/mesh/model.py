@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -40,11 +40,15 @@ class Model:
     parts: the parts in the order of the file.
     stamps: the stamp of every file that the model depends on, taken when the model was read.
     entry: the folder that holds the pictures which the mesh file embeds; None where it embeds none.
+    cameras: name -> a camera of the file, as a table of a scene file in file space.
+    lights: the lights of the file, as tables of a scene file in file space.
     """
 
     parts: tuple[MeshPart, ...]
     stamps: dict[Path, Stamp] = field(default_factory=dict)
     entry: Path | None = None
+    cameras: Mapping[str, dict[str, Any]] = field(default_factory=dict)
+    lights: tuple[dict[str, Any], ...] = ()
 
     @property
     def nbytes(self) -> int:
@@ -93,4 +97,4 @@ def model_of(contents: Contents, folder: Path) -> Model:
         transform.flags.writeable = False
         parts.append(MeshPart(part["name"], contents.meshes[part["mesh"]], transform, placed(part["material"])))
     found = stamps([*map(Path, contents.dependencies), *pictures])
-    return Model(tuple(parts), found, folder if pictures else None)
+    return Model(tuple(parts), found, folder if pictures else None, contents.cameras, tuple(contents.lights))

@@ -175,18 +175,14 @@ def _material(primitive: Any, flat: bool, both: bool, notes: list[str]) -> Brdf:
             "specularFactor": specular,
             # In pyrender 0.1.45 the property `glossinessFactor` calls itself without end, so its private field is read instead.
             "glossinessFactor": given._glossinessFactor,
+            "specularGlossinessTexture": texture("specularGlossinessTexture"),
         }
-        if given.specularGlossinessTexture is not None:
-            # An empty entry makes the reader warn that the texture is not used.
-            specular_glossiness["specularGlossinessTexture"] = {}
         table["extensions"] = {"KHR_materials_pbrSpecularGlossiness": specular_glossiness}
     if not flat:
-        # The reader warns that emission and occlusion are not used.
-        table["emissiveFactor"] = np.asarray(given.emissiveFactor).tolist()
-        normals = texture("normalTexture")
-        table |= {"normalTexture": normals} if normals else {}
-        if given.occlusionTexture is not None:
-            table["occlusionTexture"] = {}
+        # pyrender's shader multiplies the emission by this factor twice.
+        table["emissiveFactor"] = (np.clip(np.asarray(given.emissiveFactor, dtype=np.float64), 0, 1) ** 2).tolist()
+        maps = {slot: texture(slot) for slot in ("normalTexture", "emissiveTexture", "occlusionTexture")}
+        table |= {slot: info for slot, info in maps.items() if info is not None}
     return _modelled(table, header, flat, both or given.doubleSided, notes)
 
 

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.assembly.strokes import Viewport
 from glshade.brdfs import Brdf
 from glshade.errors import SceneError
 from glshade.image.srgb import srgb_to_linear
@@ -21,7 +22,7 @@ from glshade.mesh.file import AssetWarning
 from glshade.mesh.mesh import Mesh
 from glshade.pyrender.cameras import affine_rows, camera
 from glshade.pyrender.materials import WHITE, Colour, material, silhouette
-from glshade.pyrender.meshes import Viewport, arrays, is_drawn_with_strokes, mesh, strokes
+from glshade.pyrender.meshes import arrays, is_drawn_with_strokes, mesh, strokes
 from glshade.scene.camera import Perspective, is_singular
 from glshade.scene.film import Film
 from glshade.scene.object import Object, Transform

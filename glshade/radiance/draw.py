@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from glshade.arrays import rounded
 from glshade.assembly.assembly import Assembly
 from glshade.assembly.instance import Instance
-from glshade.assembly.values import ambient_intensity, direction, light_values, normal_matrix
+from glshade.assembly.values import ambient_intensity, direction, emitted, emitted_beside, light_values, normal_matrix
 from glshade.brdfs import BRDFS, Brdf
 from glshade.lights import Falloff, Light
 from glshade.radiance.sampler import Sampler
 from glshade.scene.scene import Scene
-from glshade.textures.texels import Texels, texels_of
+from glshade.textures.texels import Texels, placement_of, texels_of
 from glshade.textures.texture import CHANNELS, DirectionMap, Texture
 
 Array = NDArray[np.float64]
@@ -58,9 +58,12 @@ class Draw:
     lamps: the directed lights.
     surrounds: the omnidirectional lights that depend on the normal.
     ambient: sum (3,) of the intensities of those lights that are the same for every normal, multiplied by the exposure.
+    emission: light (3,) that the surface emits, or the factor of the emission's texture, multiplied by the exposure.
+    occlusion: strength of the occlusion map; without a map it has no effect.
     parameters: name -> value of the model's parameter, (3,) for a colour, () for a number; the factor of a textured parameter.
-    samplers: name -> texture of a textured parameter.
-    channels: name -> channel that holds a textured parameter, 0 to 3; colours ignore it.
+    added: name -> number that is added to the texels of a textured parameter and of "emission", (3,) or ().
+    samplers: name -> texture of a textured parameter, of "emission" and of "occlusion".
+    channels: name -> channel that holds a textured parameter or the occlusion, 0 to 3; colours ignore it.
     normal_map: texture of normals, from a normal map or from a bump map; None without either.
     normal_scale: factor of the map's x and y.
     directions: texture of the directions of tangents; None without a direction map.
@@ -80,7 +83,10 @@ class Draw:
     lamps: tuple[Lamp, ...]
     surrounds: tuple[Lamp, ...]
     ambient: Array
+    emission: Array
+    occlusion: float
     parameters: dict[str, Array]
+    added: dict[str, Array]
     samplers: dict[str, Sampler]
     channels: dict[str, int]
     normal_map: Sampler | None
@@ -164,17 +170,24 @@ def placed(scene: Scene, assembly: Assembly, instance: Instance, clip: Array, sa
     world_from_object = instance.world_from_object.copy()
     world_from_object[:3, 3] -= view.eye
     parameters, textures, channels = {}, {}, {}
+    added: dict[str, Array] = {"emission": emitted_beside(instance, scene.film.exposure).astype(np.float64)}
     for name, declared in type(material).parameters().items():
         value, key = getattr(material, name), name
         if value is None and declared.same_as is not None:
             key = declared.same_as
             value = getattr(material, key)
         if isinstance(value, Texture):
-            textures[name] = _sampler(texels_of(material, key), samplers)
+            textures[name] = _sampler(material, key, samplers)
             channels[name] = CHANNELS.index(value.channel or CHANNELS[0])
+            added[name] = wide(value.add if type(material).is_colour(name) else value.add[0])
             value = value.factor if type(material).is_colour(name) else value.factor[0]
         parameters[name] = wide(value)
+    if isinstance(material.emission, Texture) and material.emits:
+        textures["emission"] = _sampler(material, "emission", samplers)
     chosen = [assembly.lights[i] for i in instance.lights]
+    if material.occlusion is not None and any(light.omnidirectional for light in chosen):
+        textures["occlusion"] = _sampler(material, "occlusion", samplers)
+        channels["occlusion"] = CHANNELS.index(material.occlusion.channel)
     lamps: list[Lamp] = []
     surrounds: list[Lamp] = []
     for light in chosen:
@@ -203,20 +216,27 @@ def placed(scene: Scene, assembly: Assembly, instance: Instance, clip: Array, sa
         lamps=tuple(lamps),
         surrounds=tuple(surrounds),
         ambient=wide(ambient_intensity(assembly, instance.lights, scene.film.exposure)),
+        emission=emitted(instance, scene.film.exposure).astype(np.float64),
+        occlusion=float(rounded(material.occlusion.strength)) if material.occlusion else 0.0,
         parameters=parameters,
+        added=added,
         samplers=textures,
         channels=channels,
-        normal_map=_sampler(texels_of(material, bumps), samplers) if bumps else None,
+        normal_map=_sampler(material, bumps, samplers) if bumps else None,
         normal_scale=float(rounded(scale)),
-        directions=_sampler(texels_of(material, "tangent_direction"), samplers) if by_map else None,
+        directions=_sampler(material, "tangent_direction", samplers) if by_map else None,
         turn=wide(direction(material)),
         alpha=float(rounded(material.alpha)),
         alpha_cutoff=float(rounded(material.alpha_cutoff)),
     )
 
 
-def _sampler(texels: Texels, samplers: dict[Texels, Sampler]) -> Sampler:
-    """Returns the texture of the texels, which is read once and then kept in `samplers`. Errors: AssetError."""
+def _sampler(material: Brdf, key: str, samplers: dict[Texels, Sampler]) -> Sampler:
+    """Returns the texture that a material has under a key. Its texels are read once and then kept in `samplers`.
+
+    Errors: AssetError.
+    """
+    texels = texels_of(material, key)
     if texels not in samplers:
         samplers[texels] = Sampler.load(texels)
-    return samplers[texels]
+    return samplers[texels].placed(placement_of(material, key))

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.arrays import rounded
 from glshade.textures.mipmap import levels
 from glshade.textures.texels import Texels
-from glshade.textures.texture import WrapMode
+from glshade.textures.texture import UNPLACED, Filter, Placement, WrapMode
 
 Array = NDArray[Any]
 
@@ -36,6 +37,9 @@ class Sampler:
     heights: height of each level (L,) [texels].
     wrap: wrap modes along u and along v.
     span: how many units of texture coordinates a level spans, along u and along v.
+    filter: how texels are filtered where the picture is magnified.
+    placement: the rows (2, 3) of the matrix from a mesh's texture coordinates (u, v, 1) to the picture's, rounded to float32;
+        None where the two are the same.
     """
 
     texels: NDArray[np.float32]
@@ -44,11 +48,13 @@ class Sampler:
     heights: NDArray[np.intp]
     wrap: tuple[WrapMode, WrapMode]
     span: tuple[int, int] = (1, 1)
+    filter: Filter = "smooth"
+    placement: Array | None = None
 
     @classmethod
     def load(cls, given: Texels) -> Sampler:
         """Returns the texture of a picture file. Errors: AssetError."""
-        return cls._of(given.read(), given.wrap, given.span)
+        return replace(cls._of(given.read(), given.wrap, given.span), filter=given.filter)
 
     @classmethod
     def of(cls, pixels: NDArray[np.float32], wrap: tuple[WrapMode, WrapMode]) -> Sampler:
@@ -62,6 +68,20 @@ class Sampler:
         starts = np.concatenate([[0], np.cumsum(heights * widths)[:-1]])
         return cls(np.concatenate([level.reshape(-1, 4) for level in chain]), starts, widths, heights, wrap, span)
 
+    def placed(self, placement: Placement) -> Sampler:
+        """Returns the texture, placed on the mesh by a matrix. placement: the rows of the matrix, from `Picture.placement`."""
+        if placement == UNPLACED:
+            return self
+        return replace(self, placement=rounded(placement).astype(np.float64))
+
+    def coordinates(self, uv: Array) -> Array:
+        """Returns the picture's texture coordinates (N, 2) at those of a mesh (N, 2)."""
+        if self.placement is None:
+            return uv
+        rows = self.placement.astype(uv.dtype)
+        result: Array = uv @ rows[:, :2].T + rows[:, 2]
+        return result
+
     @property
     def size(self) -> NDArray[np.float64]:
         """The number of texels of the largest level in one unit of texture coordinates, along u and along v (2,)."""
@@ -71,11 +91,14 @@ class Sampler:
     def level(self, dx: Array, dy: Array, rule: Rule = "length") -> Array:
         """Returns the level of detail (N,) of pixels.
 
-        dx: change of the texture coordinates from a pixel to the next one in its row (N, 2).
-        dy: change of the texture coordinates from a pixel to the next one in its column (N, 2).
+        dx: change of the mesh's texture coordinates from a pixel to the next one in its row (N, 2).
+        dy: change of the mesh's texture coordinates from a pixel to the next one in its column (N, 2).
         rule: optional; the rule by which it follows from them.
         """
         size = self.size.astype(dx.dtype)
+        if self.placement is not None:
+            linear = self.placement[:, :2].T.astype(dx.dtype)
+            dx, dy = dx @ linear, dy @ linear
         # A least change of 1e-30 texels per pixel keeps the logarithm finite. It is far below level 0.
         result: Array = np.log2(np.maximum(RULES[rule](dx * size, dy * size), 1e-30))
         return result
@@ -83,10 +106,17 @@ class Sampler:
     def sample(self, uv: Array, level: Array | None = None) -> Array:
         """Returns the filtered values (N, 4) of the texture.
 
-        uv: texture coordinates (N, 2).
+        uv: texture coordinates of the picture (N, 2).
         level: optional, levels of detail (N,); without them, level 0 is read, as in the vertex stage.
         """
         base = np.zeros(len(uv), dtype=np.intp)
+        if self.filter == "nearest":
+            result = self._nearest(uv)
+            # A picture is magnified where the level of detail is at most 0 (OpenGL 4.6 core, 8.15).
+            minified = np.flatnonzero(level > 0) if level is not None else base[:0]
+            if level is not None and len(minified):
+                result[minified] = replace(self, filter="smooth").sample(uv[minified], level[minified])
+            return result
         if level is None:
             return self._bilinear(uv, base)
         last = len(self.starts) - 1
@@ -97,6 +127,14 @@ class Sampler:
         between = np.flatnonzero(t[:, 0] > 0)
         upper = self._bilinear(uv[between], lower[between] + 1)
         result[between] = result[between] * (1 - t[between]) + upper * t[between]
+        return result
+
+    def _nearest(self, uv: Array) -> Array:
+        """Returns the texels (N, 4) of level 0 in which texture coordinates (N, 2) lie (OpenGL 4.6 core, equation 8.13)."""
+        width, height = self.widths[:1], self.heights[:1]
+        column = _wrapped(np.floor(uv[:, 0] / self.span[0] * width).astype(np.intp), width, self.wrap[0])
+        row = _wrapped(np.floor(uv[:, 1] / self.span[1] * height).astype(np.intp), height, self.wrap[1])
+        result: Array = self.texels[row * width + column].astype(uv.dtype)
         return result
 
     def _bilinear(self, uv: Array, level: NDArray[np.intp]) -> Array:

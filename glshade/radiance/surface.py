@@ -111,8 +111,8 @@ def _sampled(sampler: Sampler, surface: Surface) -> Array:
     if surface.uv is None:
         raise ValueError("a texture needs texture coordinates")
     if surface.footprint is None:
-        return sampler.sample(surface.uv)
-    return sampler.sample(surface.uv, sampler.level(*surface.footprint) + surface.level)
+        return sampler.sample(sampler.coordinates(surface.uv))
+    return sampler.sample(sampler.coordinates(surface.uv), sampler.level(*surface.footprint) + surface.level)
 
 
 def alpha_of(draw: Draw, surface: Surface) -> Array:
@@ -126,14 +126,18 @@ def alpha_of(draw: Draw, surface: Surface) -> Array:
 
 
 def material_of(draw: Draw, surface: Surface) -> SimpleNamespace:
-    """Returns the model's parameters at the points: colours (N, 3) or (3,), numbers (N,) or ()."""
-    values: dict[str, Array] = {}
+    """Returns the material at the points: colours (N, 3) or (3,), numbers (N,) or ().
+
+    Beside the model's parameters it has `emission`, the light that the points emit, and `openness`, the factor of ambient
+    light.
+    """
+    values: dict[str, Array] = {"emission": _emission(draw, surface), "openness": _openness(draw, surface)}
     for name, declared in draw.model.parameters().items():
         value = draw.parameters[name].astype(surface.position.dtype)
         colour = draw.model.is_colour(name)
         if name in draw.samplers:
             texel = _sampled(draw.samplers[name], surface)
-            value = value * (texel[:, :3] if colour else texel[:, draw.channels[name]])
+            value = value * (texel[:, :3] if colour else texel[:, draw.channels[name]]) + draw.added[name].astype(value.dtype)
             # A texel outside of the parameter's range is clamped to it.
             value = np.clip(value, value.dtype.type(declared.low), declared.high and value.dtype.type(declared.high))
         # Vertex colours multiply the base colour, and a parameter that equals the base colour because it was left out.
@@ -142,6 +146,26 @@ def material_of(draw: Draw, surface: Surface) -> SimpleNamespace:
             value = value * surface.colour[:, :3]
         values[name] = value
     return SimpleNamespace(**values, **draw.instance.material.chosen())
+
+
+def _emission(draw: Draw, surface: Surface) -> Array:
+    """Returns the light, (3,) or (N, 3), that the points emit. Texels below 0 count as 0."""
+    emission = draw.emission.astype(surface.position.dtype)
+    if "emission" not in draw.samplers:
+        return emission
+    texel = _sampled(draw.samplers["emission"], surface)[:, :3]
+    result: Array = np.maximum(emission * texel + draw.added["emission"].astype(emission.dtype), 0)
+    return result
+
+
+def _openness(draw: Draw, surface: Surface) -> Array:
+    """Returns the factor, (1,) or (N, 1), by which the occlusion map multiplies ambient light at the points."""
+    dtype = surface.position.dtype
+    if "occlusion" not in draw.samplers:
+        return np.ones(1, dtype=dtype)
+    texel = _sampled(draw.samplers["occlusion"], surface)[:, draw.channels["occlusion"], None]
+    result: Array = 1 + dtype.type(draw.occlusion) * (np.clip(texel, 0, 1) - 1)
+    return result
 
 
 def _stands_for_base(draw: Draw, name: str) -> bool:
@@ -199,14 +223,14 @@ def evaluate_surface(draw: Draw, surface: Surface, material: SimpleNamespace | N
     if draw.instance.shows != "light":
         return _property(draw, surface)
     m = material or material_of(draw, surface)
-    total = np.zeros((len(surface.position), 3), dtype=dtype)
+    total: Array = np.zeros((len(surface.position), 3), dtype=dtype) + m.emission
     if draw.ambient.any():
-        total += draw.ambient.astype(dtype) * draw.model.ambient_reflectance(m)
+        total += m.openness * draw.ambient.astype(dtype) * draw.model.ambient_reflectance(m)
     if not (draw.lamps or draw.surrounds):
         return total
     t, b, n = _frame(draw, surface)
     for lamp in draw.surrounds:
-        total += lamp.kind.illuminate(lamp.fields(dtype), n) * draw.model.ambient_reflectance(m)
+        total += m.openness * lamp.kind.illuminate(lamp.fields(dtype), n) * draw.model.ambient_reflectance(m)
     if not draw.lamps:
         return total
 

@@ -275,6 +275,7 @@ def _attributes(draw: Draw, fragments: Fragments, planes: Planes, driver: Freedo
         if driver.texel:
             largest_texel = max(1 / sampler.size.min() for sampler in draw.pictures)
             errors["uv"] = errors["uv"] + driver.texel * largest_texel
+        errors["uv"] = errors["uv"] + _placing(draw, surface, driver)
         errors["level"] = _levels(draw, fragments, surface, planes.size, driver)
     return replace(surface, **middles), _Errors(**errors)
 
@@ -294,7 +295,75 @@ def _vertex_errors(draw: Draw, surface: Surface, vertices: NDArray[np.intp], dri
         position=driver.window * U * world if _positions_matter(draw) else None,
         normal=unit,
         tangent=unit if surface.tangent is not None else None,
+        uv=_coordinates(draw, surface, driver),
     )
+
+
+def _coordinates(draw: Draw, surface: Surface, driver: Freedom) -> Array | None:
+    """Returns the errors (N, 2) of the texture coordinates at which the vertex stage reads textures.
+
+    The result is None for textures that are all smooth and not placed by a matrix: their colours change so little with the
+    coordinates that the rounding of the shading covers it.
+    """
+    placed = any(sampler.placement is not None for sampler in draw.pictures)
+    nearest = [sampler for sampler in draw.pictures if sampler.filter == "nearest"]
+    if surface.uv is None or not (placed or nearest):
+        return None
+    error = np.full_like(surface.uv, 4 * U)
+    if not placed:
+        # A vertex often lies exactly on the border of two texels. No operation rounds such a coordinate.
+        for sampler in nearest:
+            at = surface.uv * sampler.size
+            error[at == np.rint(at)] = 0.0
+    return error + _placing(draw, surface, driver)
+
+
+def _placing(draw: Draw, surface: Surface, driver: Freedom) -> Array:
+    """Returns the errors (N, 2) of a mesh's texture coordinates that stand for the errors of those that a matrix makes of them.
+
+    Each coordinate is a sum of three terms. Its wrapping and scaling then round relative to the whole side of the texture.
+    draw: the instance that is drawn.
+    surface: N points with the exact texture coordinates of the mesh.
+    driver: the errors of the driver's fixed functions.
+    """
+    uv = surface.uv
+    assert uv is not None
+    worst = np.zeros_like(uv)
+    for sampler in draw.pictures:
+        if sampler.placement is not None:
+            linear, offset = sampler.placement[:, :2], sampler.placement[:, 2]
+            terms = np.abs(uv) @ np.abs(linear).T + np.abs(offset)
+            error = 4 * U * (terms + 1) + driver.texel / sampler.size.min()
+            worst = np.maximum(worst, error @ np.abs(np.linalg.inv(linear)).T)
+    return worst
+
+
+def _beside_borders(draw: Draw, surface: Surface, error: Array) -> NDArray[np.intp]:
+    """Returns the points whose coordinates, with their errors (N, 2), may lie in several texels of a texture that is nearest.
+
+    The driver may show any of these texels.
+    """
+    beside = np.zeros(len(error), dtype=np.bool_)
+    for sampler in draw.pictures:
+        if sampler.filter == "nearest" and surface.uv is not None:
+            linear = np.eye(2) if sampler.placement is None else sampler.placement[:, :2]
+            at, reach = sampler.coordinates(surface.uv), error @ np.abs(linear).T
+            first, last = (np.floor((at + sign * reach) * sampler.size) for sign in (-1, 1))
+            beside |= (first != last).any(axis=1)
+    return np.flatnonzero(beside)
+
+
+def _in_all_texels(surface: Surface, errors: _Errors) -> Iterator[Surface]:
+    """Yields the surface with its texture coordinates, and their level of detail, at places all over their errors.
+
+    A texture that is nearest is magnified, so that a pixel spans at most one texel: no texel lies between two places.
+    """
+    assert errors.uv is not None
+    across, up = (_spaced(-error, error, SHIFTS) for error in errors.uv.T)
+    for u, v in product(across, up):
+        moved = _moved(_moved(surface, "uv", 0, u), "uv", 1, v)
+        for level in (surface.level, *(errors.level or ())):
+            yield replace(moved, level=level)
 
 
 def _positions_matter(draw: Draw) -> bool:
@@ -494,6 +563,11 @@ def _spread(
         shifts = _spaced(-error, error, SHIFTS)
         values = _evaluated(draw, evaluate, (_moved(surface, "uv", axis, shift) for shift in shifts))
         widen(values, _between(values))
+    beside = _beside_borders(draw, surface, errors.uv) if errors.uv is not None else which[:0]
+    if len(beside):
+        light = np.stack(_evaluated(draw, evaluate, _in_all_texels(part_of(surface, beside), _taken(errors, beside))))
+        below[beside] += np.maximum(value[beside] - light.min(axis=0), 0)
+        above[beside] += np.maximum(light.max(axis=0) - value[beside], 0)
     if errors.colour is not None and surface.colour is not None:
         widen([evaluate(draw, replace(surface, colour=surface.colour + sign * errors.colour)) for sign in (-1, 1)])
     level = np.zeros_like(value)
@@ -644,6 +718,12 @@ def _alphas(draw: Draw, surface: Surface, errors: _Errors, driver: Freedom) -> A
             samples = [alpha_of(draw, replace(surface, level=offset)) for offset in _spaced(*errors.level, LEVELS)]
             margin = _between(samples)
             others += [np.minimum.reduce(samples) - margin, np.maximum.reduce(samples) + margin]
+        beside = _beside_borders(draw, surface, errors.uv)
+        if len(beside):
+            shown = [alpha_of(draw, moved) for moved in _in_all_texels(part_of(surface, beside), _taken(errors, beside))]
+            for end in (np.minimum.reduce(shown), np.maximum.reduce(shown)):
+                others.append(value.copy())
+                others[-1][beside] = end
     # Alpha is a product of three factors; 8 roundings are more than enough.
     slack: Array = 8 * U * np.abs(value)
     if errors.colour is not None and surface.colour is not None:

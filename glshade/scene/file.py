@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import tomllib
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -14,13 +15,13 @@ from typing import TYPE_CHECKING, Any
 from pydantic import ValidationError
 
 from glshade.document import nearest
-from glshade.errors import AssetError, SceneError
+from glshade.errors import AssetError, AssetWarning, SceneError
 from glshade.files import read_bytes
 from glshade.image.file import probe
 from glshade.limits import DEFAULT, LARGEST_SCENE, MOST_FAULTS, Limits
 from glshade.mesh import file as mesh_file
 from glshade.mesh.model import Model
-from glshade.scene import checking
+from glshade.scene import checking, of_files, up
 from glshade.scene.models import Folders, use_models, use_shader_models
 from glshade.scene.scene import Scene
 
@@ -46,7 +47,8 @@ def load(
     For a mesh file alone, a default camera and the default lights are chosen, and the materials are the mesh file's own.
     path: a scene file or a mesh file.
     overrides: values that replace those of the file, in their order: a table of dotted keys such as "materials.body.roughness"
-        or "objects.ball.shading"; or pairs of key and text, as in `--set KEY=VALUE`.
+        or "objects.ball.shading"; or pairs of key and text, as in `--set KEY=VALUE`. For a mesh file, "up" names the axis that
+        points up: "x", "y", "z", or "auto" (z for .stl, else y).
     models: a folder, or several, with reflectance models and lights of the user's own.
     shaders: a shader folder, or several, whose files brdf/NAME.glsl may be reflectance models.
     allow_outside: whether mesh files may name textures, materials and buffers outside their folder and the folders that the
@@ -74,13 +76,18 @@ class SceneFile:
         if suffix in mesh_file.SUFFIXES:
             mesh_file.load(self.path, limits)
             # Overrides find the object by its name. The path is absolute, so that it is right from any folder.
-            mesh = {"name": self.path.stem, "mesh": str(self.path.resolve())}
-            document: Any = {"description": self.path.name, "objects": [mesh], "film": {"samples": 4, "background": BACKDROP}}
+            mesh: dict[str, Any] = {"name": self.path.stem, "mesh": str(self.path.resolve())}
+            rotate, overrides = up.turn(self.path, overrides)
+            if any(rotate):
+                mesh["transform"] = {"rotate": rotate}
+            document: Any = {"description": self.path.name, "objects": [mesh], "film": FILM}
         elif suffix in TEXT_SUFFIXES:
+            up.refuse(self.path, overrides)
             document = _read(self.path)
         else:
             known = ", ".join([*TEXT_SUFFIXES, *sorted(mesh_file.SUFFIXES)])
             raise SceneError(f"{self.path}: {suffix or 'no extension'} is neither a scene nor a mesh; known: {known}")
+        document, overrides = of_files.chosen(document, overrides)
         self.document = _overridden(document, overrides, self.path)
         self._as_written = self.document is document
         # The texture files that are known to be readable.
@@ -99,14 +106,15 @@ class SceneFile:
 
     @property
     def cameras(self) -> tuple[str, ...]:
-        """The names of the scene's further cameras. Errors: SceneError."""
-        return tuple(self._written.cameras)
+        """The names of the scene's further cameras, and those of the cameras in its mesh files. Errors: SceneError."""
+        written = self._written
+        return tuple({**of_files.file_cameras(written, written.loader()), **written.cameras})
 
     def scene(self, frame: float | None = None, camera: str | None = None) -> Scene:
         """Returns the scene.
 
         frame: the frame of the animation; None: the scene without its animation.
-        camera: the name of one of the scene's further cameras; None: the scene's own camera.
+        camera: the name of one of the scene's further cameras, or of a camera in a mesh file; None: the scene's own camera.
         Errors: SceneError with every fault. A fault that the file has only with the overrides is marked "(from --set)".
         """
         try:
@@ -124,9 +132,11 @@ class SceneFile:
     def _scene(self, frame: float | None, camera: str | None) -> Scene:
         scene = self._written if frame is None else self._at(frame)
         if camera is not None:
-            if camera not in self.cameras:
+            # The mesh files are read first, because they may hold the camera.
+            self._check(scene)
+            if camera not in scene.cameras and camera not in self.cameras:
                 raise SceneError(f'{self.path}: no camera is named "{camera}"{nearest(camera, self.cameras)}')
-            scene = self._through(camera, scene)
+            return self._through(camera, scene)
         self._check(scene)
         return scene
 
@@ -147,7 +157,8 @@ class SceneFile:
     def _through(self, camera: str, scene: Scene) -> Scene:
         """Returns the scene with one of its further cameras; the same object for the same scene."""
         if camera not in self._seen or self._seen[camera][0] is not scene:
-            self._seen[camera] = scene, scene.model_copy(update={"camera": scene.cameras[camera]})
+            view = scene.cameras.get(camera) or of_files.file_cameras(scene, scene.loader())[camera]
+            self._seen[camera] = scene, scene.model_copy(update={"camera": view})
         return self._seen[camera][1]
 
     def _check(self, scene: Scene) -> None:
@@ -177,6 +188,9 @@ class SceneFile:
                 problems.append(f"{self.path}: {place}: {error}")
         if problems:
             raise SceneError(problems)
+        if self._checked is None:
+            for line in of_files.unused_lights(scene, models):
+                warnings.warn(line, AssetWarning, stacklevel=2)
         self._checked = scene
 
 
@@ -227,8 +241,9 @@ def _overridden(document: Any, overrides: Overrides, path: Path) -> Any:
     return document
 
 
-# The background of a scene that is a mesh file alone: a dark grey, from which light and dark objects both stand out.
-BACKDROP = (0.05, 0.055, 0.065)
+# The film of a scene that is a mesh file alone. From its dark grey background light and dark objects both stand out. Single
+# points of one pixel would hardly be seen on it, so they are twice as wide.
+FILM = {"samples": 4, "background": (0.05, 0.055, 0.065), "point_size": 2.0}
 
 
 def parse(data: Any, path: Path, limits: Limits = DEFAULT) -> Scene:

@@ -25,6 +25,8 @@ LARGEST_SIDE = 131072
 # 16 x 16 pictures already take 256 times as long as one, so a larger number is most likely a typing error.
 LARGEST_SUPERSAMPLE = 16
 
+# The largest side of a point [pixels]. The squares of a million points of this size cover 6.5e10 pixels, which takes minutes.
+LARGEST_POINT = 256
 # The largest number of a background. The sum of 16 x 16 of them fits into float32.
 BRIGHTEST = 1e30
 
@@ -72,6 +74,9 @@ class Film(Document):
     supersample: Annotated[int, Field(ge=1, le=LARGEST_SUPERSAMPLE), BeforeValidator(number)] = Field(
         1,
         description="n x n pictures, shifted within the pixel, are averaged in linear light: smooths shading and edges",
+    )
+    point_size: Annotated[float, Field(ge=1, le=LARGEST_POINT)] = Field(
+        1.0, description="side of the squares that points become, and width of lines, in meshes of points and lines [pixels]"
     )
     background: Annotated[tuple[Finite, ...], AfterValidator(_colour_with_alpha)] = Field(
         (0.0, 0.0, 0.0),

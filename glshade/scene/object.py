@@ -103,7 +103,7 @@ def _mesh(value: Any) -> Any:
     else:
         raise fault("must be the path of a mesh file (or, in Python, a Mesh, a trimesh or a pair of vertices and faces)")
     try:
-        return Mesh.build(np.asarray(vertices, dtype=np.float64), np.asarray(faces), None, uvs, colours)
+        return Mesh.build(np.asarray(vertices), np.asarray(faces), None, uvs, colours)
     except AssetError as error:
         raise fault("; ".join(error.problems)) from None
 
@@ -132,7 +132,10 @@ MESH_FILES = f"mesh file: {', '.join(SUFFIXES)}"
 
 
 class Object(Document):
-    """Something to draw: a mesh or a shape, with its transform, its material and its shading."""
+    """Something to draw: a mesh or a shape, with its transform, its material and its shading.
+
+    An object without mesh and shape draws nothing. Its transform applies to the objects that name it as their parent.
+    """
 
     name: str | None = Field(None, description="name of the object, for lights, parents, dotted keys and messages")
     mesh: Annotated[MeshSource, BeforeValidator(_mesh)] | None = Field(None, description=MESH_FILES)
@@ -153,18 +156,22 @@ class Object(Document):
         "auto", description="normals of faces, or smooth up to the threshold; auto: the mesh's own, smooth where it has none"
     )
     threshold: Annotated[float, Field(ge=0, le=180)] = Field(
-        60.0, description="an edge stays sharp where the normals of its faces differ by a larger angle [degrees]"
+        40.0, description="least angle between two faces at which their edge is sharp; at 180 no edge is sharp [degrees]"
     )
     sides: Sides = Field(
         "auto",
-        description="front: back faces are culled; both: normals turn to the viewer; auto: front if the mesh is closed",
+        description="front: back faces are culled; both: where the back is seen, the normal is reversed; auto: front if closed",
     )
     vertex_colours: bool = Field(True, description="whether the mesh's vertex colours multiply the base colour")
+    file_lights: bool = Field(
+        False,
+        description="whether the lights of its mesh file shine, in lux and candela: the radiance 1 is then 1 cd/m^2",
+    )
     quality: Quality | None = Field(None, description="replaces the scene's quality key by key; storage is not allowed here")
 
     @classmethod
     def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
-        if isinstance(data, Mapping) and (data.get("mesh") is None) == (data.get("shape") is None):
-            yield (), "needs a mesh or a shape, and not both"
+        if isinstance(data, Mapping) and data.get("mesh") is not None and data.get("shape") is not None:
+            yield (), "has a mesh and a shape; an object draws one of them"
         if value_of(value_of(data, "quality"), "storage") is not None:
             yield ("quality", "storage"), "applies to the whole picture: set it in the scene's own [quality]"

@@ -143,7 +143,12 @@ class Scene(Document):
                     yield ("objects", index, "name"), f'"{name}" is already the name of objects[{names[name]}]'
                 names.setdefault(name, index)
         parents = {name: value_of(objects[index], "parent") for name, index in names.items()}
+        followed = {value_of(item, "parent") for item in objects}
         for index, item in enumerate(objects):
+            is_empty = value_of(item, "mesh") is None and value_of(item, "shape") is None
+            # What is neither a table nor an object has a fault of its own.
+            if isinstance(item, Mapping | Object) and is_empty and value_of(item, "name") not in followed - {None}:
+                yield ("objects", index), "needs a mesh or a shape: no object names it as its parent"
             material, parent = value_of(item, "material"), value_of(item, "parent")
             if isinstance(material, str) and material not in materials and material not in PRESETS:
                 yield (

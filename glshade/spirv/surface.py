@@ -16,7 +16,7 @@ from glshade.glsl.plan import PAGE, ProgramPlan
 from glshade.glsl.planner import further_plan, plan_instance
 from glshade.glsl.shaders import Shaders
 from glshade.glsl.source import Source, Stage
-from glshade.glsl.uniforms import ambient_radiance, light_pages, light_uniforms, object_uniforms, textures
+from glshade.glsl.uniforms import exposed_uniforms, light_pages, light_uniforms, object_uniforms, pictures
 from glshade.lights import LIGHTS
 from glshade.radiance.draw import Draw, wide
 from glshade.radiance.sampler import Sampler
@@ -27,6 +27,7 @@ from glshade.spirv.compiler import compiled
 from glshade.spirv.digits import Digits, Run, measure_digits, measure_errors
 from glshade.spirv.machine import Observer, run
 from glshade.spirv.module import Module, StageName
+from glshade.textures.texels import placement_of, texels_of
 
 Array = NDArray[Any]
 
@@ -181,8 +182,7 @@ def _programs(scene: Scene, assembly: Assembly, draw: Draw, shaders: Shaders) ->
         of_page = further_plan(plan, instance, [len(records) for _, records in pages], index) if index else plan
         uniforms: dict[str, Any] = dict(object_uniforms(of_page, instance, assembly.view.eye))
         uniforms |= {} if index else _lights(of_page, instance, assembly, exposure)
-        if of_page.ambient == "constant":
-            uniforms |= ambient_radiance(instance, assembly, exposure)
+        uniforms |= exposed_uniforms(of_page, instance, assembly, exposure)
         for key, records in pages:
             if index < len(records):
                 uniforms |= _block(key, records[index])
@@ -207,7 +207,11 @@ def _program(plan: ProgramPlan, instance: Instance, assembly: Assembly, uniforms
         "u_viewer": wide(assembly.view.toward_viewer),
     }
     stage, name = shading_stage(generate(plan, shaders), plan.rate)
-    samplers = {key: Sampler.load(texels) for key, texels in textures(plan, instance.material).items()}
+    material = instance.material
+    samplers = {
+        name: Sampler.load(texels_of(material, key)).placed(placement_of(material, key))
+        for name, key in pictures(plan, material).items()
+    }
     return Program(compiled(stage, name), stage, plan.rate, uniforms, samplers)
 
 

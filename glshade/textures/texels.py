@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.image import file as picture_file
-from glshade.textures.texture import BumpMap, Encoding, Picture, Texture, WrapMode
+from glshade.textures.texture import BumpMap, Encoding, Filter, Picture, Placement, Texture, WrapMode
 
 Pixels = NDArray[np.float32]
 
@@ -23,12 +23,14 @@ class Texels:
     given: the wrap modes that the material asks for, along u and along v.
     encoding: the encoding of the file's colours.
     heights: whether the file holds heights, from which normals are made for the upload.
+    filter: how texels are filtered where the picture is magnified.
     """
 
     path: Path
     given: tuple[WrapMode, WrapMode]
     encoding: Encoding = "linear"
     heights: bool = False
+    filter: Filter = "smooth"
 
     @property
     def span(self) -> tuple[int, int]:
@@ -59,10 +61,16 @@ def texels_of(material: Any, name: str) -> Texels:
     """Returns the Texels of the picture that a material has under the key `name`."""
     picture: Picture = getattr(material, name)
     if not isinstance(picture, Texture):
-        return Texels(picture.texture, picture.wrap, heights=isinstance(picture, BumpMap))
+        return Texels(picture.texture, picture.wrap, heights=isinstance(picture, BumpMap), filter=picture.filter)
     # Parameters that are numbers are stored as they are: only colours are sRGB-encoded.
     linear = picture.encoding == "auto" and not type(material).is_colour(name)
-    return Texels(picture.texture, picture.wrap, "linear" if linear else picture.encoding)
+    return Texels(picture.texture, picture.wrap, "linear" if linear else picture.encoding, filter=picture.filter)
+
+
+def placement_of(material: Any, name: str) -> Placement:
+    """Returns the placement of the picture that a material has under the key `name`."""
+    placement: Placement = getattr(material, name).placement
+    return placement
 
 
 def normals(heights: Pixels, wrap: tuple[WrapMode, WrapMode]) -> Pixels:

@@ -1,19 +1,33 @@
 """Texture: the pictures that let a material vary over a surface: its parameters, normals, heights or directions."""
 
+import math
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Field, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
 
-from glshade.document import Document, File, Finite, Triple
+from glshade.document import Document, File, Finite, Triple, fault
 
 WrapMode = Literal["repeat", "clamp", "mirror"]
 Encoding = Literal["auto", "srgb", "linear"]
+Filter = Literal["smooth", "nearest"]
+# The two rows of the matrix from a mesh's texture coordinates (u, v, 1) to a picture's.
+Placement = tuple[tuple[float, float, float], tuple[float, float, float]]
+UNPLACED: Placement = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0))
+# The least and the largest scale of texture coordinates. A repeat of a millionth of the mesh is far smaller than a pixel, and
+# the bounds of a picture's colours need a matrix that can be inverted.
+SMALLEST_SCALE, LARGEST_SCALE = 1e-6, 1e6
 _MODE = {"enum": ["repeat", "clamp", "mirror"]}
 CHANNELS = "rgba"
 
 
 def _pair(value: Any) -> Any:
-    return (value, value) if isinstance(value, str) else value
+    return (value, value) if isinstance(value, str | int | float) else value
+
+
+def _scale(value: tuple[float, float]) -> tuple[float, float]:
+    if not all(SMALLEST_SCALE <= abs(x) <= LARGEST_SCALE for x in value):
+        raise fault(f"must be from {SMALLEST_SCALE:g} to {LARGEST_SCALE:g}, or the negative of that, not {list(value)}")
+    return value
 
 
 # Two wrap modes, along u and along v; the scene file may give one mode in place of two equal ones.
@@ -22,20 +36,52 @@ Wrap = Annotated[
     BeforeValidator(_pair),
     WithJsonSchema({"anyOf": [_MODE, {"type": "array", "items": _MODE, "minItems": 2, "maxItems": 2}]}),
 ]
+_NUMBER = {"type": "number"}
+# Two numbers, along u and along v; the scene file may give one number in place of two equal ones.
+Scale = Annotated[
+    tuple[Finite, Finite],
+    AfterValidator(_scale),
+    BeforeValidator(_pair),
+    WithJsonSchema({"anyOf": [_NUMBER, {"type": "array", "items": _NUMBER, "minItems": 2, "maxItems": 2}]}),
+]
 
 
 class Picture(Document):
-    """A picture file that is placed on a surface by texture coordinates. v = 0 is its bottom row."""
+    """A picture file that is placed on a surface by texture coordinates. v = 0 is its bottom row.
+
+    The picture is read at uv_offset + turned(uv_scale * uv), where uv are the mesh's texture coordinates.
+    """
 
     texture: File = Field(description="picture file")
     wrap: Wrap = Field(("repeat", "repeat"), description="how the picture continues outside [0, 1], along u and along v")
+    filter: Filter = Field(
+        "smooth",
+        description="between the texels of a magnified picture: smooth, or nearest, where each texel is a square of one colour",
+    )
+    uv_scale: Scale = Field((1.0, 1.0), description="multiplies the texture coordinates u and v, so that the picture repeats")
+    uv_rotate: Finite = Field(0.0, description="angle by which these coordinates are turned, from u toward v [degrees]")
+    uv_offset: tuple[Finite, Finite] = Field(
+        (0.0, 0.0), description="moves texture coordinates that are scaled and turned [sizes of the picture]"
+    )
+
+    @property
+    def placement(self) -> Placement:
+        """The rows of the matrix from texture coordinates (u, v, 1) to those at which the picture is read."""
+        angle = math.radians(self.uv_rotate % 360)
+        # Without the rounding, a quarter turn would have a cosine of 6e-17.
+        cos, sin = round(math.cos(angle), 15), round(math.sin(angle), 15)
+        (su, sv), (ou, ov) = self.uv_scale, self.uv_offset
+        return (cos * su, -sin * sv, ou), (sin * su, cos * sv, ov)
 
 
 class Texture(Picture):
-    """A picture file whose values are multiplied by `factor`. v = 0 is the picture's bottom row."""
+    """A picture file whose values are multiplied by `factor`, and to which `add` is then added. v = 0 is its bottom row."""
 
     factor: Triple = Field(
         (1.0, 1.0, 1.0), description="multiplies the linear values; a parameter that is one number takes the first"
+    )
+    add: Triple = Field(
+        (0.0, 0.0, 0.0), description="is added after the factor; with factor -1, an add of 1 turns gloss into roughness"
     )
     encoding: Encoding = Field(
         "auto",
@@ -77,3 +123,14 @@ class DirectionMap(Picture):
     """
 
     rotate: Finite = Field(0.0, description="angle by which the directions are turned, from u toward v [degrees]")
+
+
+class OcclusionMap(Picture):
+    """A map of how open each point of a surface is to light from all around it: 1 in the open, 0 in a closed crevice.
+
+    The file is read as linear, and values outside [0, 1] are clamped to it. Ambient light is multiplied by
+    1 + strength (x - 1), as in glTF 2.0, section 3.9.3; light from a direction and emission stay as they are.
+    """
+
+    channel: Literal["r", "g", "b", "a"] = Field("r", description="channel that is read")
+    strength: Annotated[float, Field(ge=0, le=1)] = Field(1.0, description="0: no effect; 1: the full effect")

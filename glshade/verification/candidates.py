@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.arrays import group_starts
+from glshade.assembly.strokes import has_strokes
 from glshade.glsl.shaders import Shaders
 from glshade.reference.bounds import TINY, Bounds, fragment_bounds
 from glshade.reference.freedom import LLVMPIPE, Freedom
@@ -439,6 +440,22 @@ def one_sample(scene: Scene) -> Scene:
     """Returns the scene with one sample a pixel, and otherwise as `judgeable` does."""
     film = scene.film.model_copy(update={"samples": 1, "supersample": 1})
     return judgeable(scene.model_copy(update={"film": film}))
+
+
+def at_centres(scene: Scene) -> tuple[Scene, tuple[str, ...]]:
+    """Returns a scene with points or lines with one sample a pixel, and the settings that this takes away. Any other scene is
+    returned as it is.
+
+    A pixel at an edge has a mixture of values, for which there are wide bounds alone. Points and lines of a few pixels consist
+    of edges, so they are judged at the centres of the pixels.
+    """
+    film = scene.film
+    if film.pictures == 1 or not has_strokes(scene):
+        return scene, ()
+    changed = {key: getattr(film, key) for key in ("samples", "supersample") if getattr(film, key) > 1}
+    single = film.model_copy(update=dict.fromkeys(changed, 1))
+    settings = tuple(f"film.{key} = {value}" for key, value in changed.items())
+    return scene.model_copy(update={"film": single}), settings
 
 
 def left_out(scene: Scene) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from glshade.reference.freedom import UNMEASURED, Freedom
 from glshade.scene.models import Folders, paths, use_models
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
-from glshade.verification.candidates import find_candidates, judgeable, left_out
+from glshade.verification.candidates import at_centres, find_candidates, judgeable, left_out
 from glshade.verification.own_text import differences
 from glshade.verification.verdict import MAX_AMBIGUOUS, Verdict, verdict_of
 
@@ -59,6 +59,9 @@ def verify(
     use_models(models)
     not_judged = left_out(scene)
     scene = judgeable(scene)
+    if picture is None:
+        scene, more = at_centres(scene)
+        not_judged = (*not_judged, *more)
     start = perf_counter()
     made_by = ""
     with ExitStack() as opened:

@@ -29,6 +29,7 @@ FEATURES = {
     *("object.threshold", "object.sides front", "object.sides both", "object.material", "material.sides both"),
     *(f"material.brdf {name}" for name in MODELS),
     *("material.tangent_direction", "normal_map.scale", "bump_map.height"),
+    *("material.emission", "occlusion.strength", "occlusion.channel g", "material.unlit"),
     *(f"{name}.wrap {mode}" for name in ("texture", "normal_map", "bump_map") for mode in ("repeat", "clamp", "mirror")),
     *("texture.factor", "texture.channel g", "texture.encoding srgb", "texture.encoding linear"),
     *(f"light.type {name}" for name in ("ambient", "directional", "point", "spot", "gltf_spot")),

@@ -26,7 +26,7 @@ class _Selection:
     """A part of the light: that of some lights, by some lobes, on some objects.
 
     kind, name: as in SceneFault, without the factor.
-    lights: the indices of the lights; an empty tuple stands for all.
+    lights: the indices of the lights, where the number of lights stands for emission; an empty tuple stands for all.
     lobe: 0 for diffuse light, 1 for specular light, -1 for both.
     draw: the only draw; -1 for all.
     """
@@ -42,7 +42,11 @@ class _Selection:
         return f"{self.name}{of} x {factor}"
 
     def of(self, atoms: Array, drawn: NDArray[np.intp]) -> Array:
-        """Returns the selected light (K, 3). atoms: (L, 2, K, 3), diffuse and specular light of each light. drawn: (K,)."""
+        """Returns the selected light (K, 3).
+
+        atoms: (L + 1, 2, K, 3), diffuse and specular light of each light, and emission as diffuse light.
+        drawn: (K,), as in Surfaces.object.
+        """
         lights = list(self.lights) or slice(None)
         lobes = slice(None) if self.lobe < 0 else slice(self.lobe, self.lobe + 1)
         part: Array = atoms[lights][:, lobes].sum(axis=(0, 1))
@@ -83,11 +87,15 @@ def scaled(fitting: Fitting) -> Iterator[SceneFault]:
 
 def _selections(fitting: Fitting, atoms: Array) -> Iterator[_Selection]:
     """Yields the parts of the light whose strength may be wrong, the simplest ones first."""
-    lights = fitting.surfaces.assembly.lights
+    lights, own = fitting.surfaces.assembly.lights, fitting.surfaces.assembly.own_light
+    # Unlit surfaces show their base colours by a light of their own, which counts as emission.
+    emitted = (len(lights),) if own is None else (own, len(lights))
     directed = tuple(number for number, light in enumerate(lights) if not light.omnidirectional)
     for draw in (-1, *fitting.objects):
-        for number in range(len(lights)):
+        for number in range(emitted[0]):
             yield _Selection("light", f"light {literal(fitting.surfaces.light_name(number))}", (number,), draw=draw)
+        if atoms[list(emitted)].any():
+            yield _Selection("emission", "emission", emitted, draw=draw)
         yield _Selection("light", "all light", draw=draw)
         if len(directed) < len(lights):
             yield _Selection("light", "light of all lights with a direction", directed, draw=draw)
@@ -143,7 +151,7 @@ def _paired(
 ) -> tuple[float, tuple[_Selection, _Selection], Array]:
     """Returns the share of the change that two parts explain together, the parts, and their best factors (2,).
 
-    atoms: (L, 2, K, 3), as in `_Selection.of`.
+    atoms: (L + 1, 2, K, 3), as in `_Selection.of`.
     """
     surfaces, factors = fitting.surfaces, np.ones(2)
     rest = surfaces.light - atoms.sum(axis=(0, 1))
@@ -156,7 +164,7 @@ def _paired(
 
 
 def _multiplied(atoms: Array, drawn: NDArray[np.intp], selection: _Selection, factor: float) -> Array:
-    """Returns a copy of the atoms (L, 2, K, 3) with a part of the light multiplied. drawn: (K,), as in Surfaces.object."""
+    """Returns a copy of the atoms (L + 1, 2, K, 3) with a part of the light multiplied. drawn: (K,), as in Surfaces.object."""
     result = atoms.copy()
     lights = list(selection.lights) or slice(None)
     lobes = slice(None) if selection.lobe < 0 else slice(selection.lobe, selection.lobe + 1)

@@ -27,6 +27,7 @@ def read(file: MeshFile) -> Contents:
     import importlib
 
     from glshade.mesh.reading.parser import quiet
+    from glshade.mesh.reading.textures import settle
 
     suffix = file.path.suffix.lower()
     try:
@@ -35,8 +36,15 @@ def read(file: MeshFile) -> Contents:
     except AssetError:
         raise
     except Exception as error:  # a parser may raise anything on broken input, and the user gets one line that names the file
-        detail = f"{type(error).__name__}: {error}".rstrip(": ")
-        raise file.fail(f"not a readable {suffix[1:].upper()} file ({detail[:200]})") from error
+        kind = suffix[1:].upper()
+        if isinstance(error, MemoryError):
+            raise file.fail(f"reading this {kind} file takes more memory than there is") from error
+        raise file.fail(
+            f"is not a readable {kind} file: its parts do not fit together; is it damaged, or of another format?"
+        ) from error
+    for line in file.faults.lines():
+        file.warn(line)
     if not file.contents.parts:
         raise file.fail("holds no triangles")
+    settle(file)
     return file.contents

@@ -2,190 +2,243 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from glshade.arrays import Float64
 from glshade.mesh.mesh import Mesh
-from glshade.mesh.reading import gltf_material
+from glshade.mesh.reading import gltf_geometry, gltf_material
 from glshade.mesh.reading.colours import with_alpha
 from glshade.mesh.reading.contents import Material
-from glshade.mesh.reading.file import MeshFile
-from glshade.mesh.reading.gltf_container import opened
-from glshade.mesh.reading.parser import parse
+from glshade.mesh.reading.file import MeshFile, short
+from glshade.mesh.reading.gltf_accessors import Accessors
+from glshade.mesh.reading.gltf_container import MESHOPT, opened
+from glshade.mesh.reading.gltf_geometry import LINE_LOOP, LINES, POINTS, TRIANGLES, Geometry
+from glshade.mesh.reading.gltf_nodes import Nodes, instances, is_flat
+from glshade.mesh.reading.gltf_scene import add_camera, add_light
+from glshade.mesh.strokes import segments
 
-_TRIANGLES, _STRIP = 4, 5
-_COMPRESSED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression")
+# The extensions that this reader follows, in addition to those of materials.
+FOLLOWED = {
+    "EXT_mesh_gpu_instancing",
+    "KHR_draco_mesh_compression",
+    "KHR_lights_punctual",
+    "KHR_mesh_quantization",
+    "KHR_node_visibility",
+    *MESHOPT,
+}
+# Extensions that do not change the picture of a file's default state, or only annotate it.
+HARMLESS = {
+    "EXT_mesh_features",
+    "EXT_structural_metadata",
+    "KHR_animation_pointer",
+    "KHR_materials_variants",
+    "KHR_node_hoverability",
+    "KHR_node_selectability",
+    "KHR_xmp",
+    "KHR_xmp_json_ld",
+}
+# The starts of the names of extensions of materials, about which glshade.mesh.reading.gltf_material warns.
+OF_MATERIALS = ("KHR_materials_", "KHR_texture_", "EXT_texture_", "MSFT_texture_")
 
 
 def read(file: MeshFile) -> None:
-    """Adds a part for each primitive of each node of a glTF scene; nodes with one mesh share it. Errors: AssetError."""
-    header, buffers = opened(file)
-    for extension in header.get("extensionsRequired", ()):
-        if extension in _COMPRESSED:
-            raise file.fail(f"needs the glTF extension {extension}, which is not supported; save it uncompressed")
-    accessors = header.get("accessors", [])
-
-    # trimesh gets the primitives that consist of triangles, in meshes whose names are their numbers. Attributes whose names
-    # start with "_" come back unchanged. Nodes are not given to trimesh, because its scene graph loses the children of cameras.
-    kept: list[tuple[int, dict[str, Any]]] = []
-    others = 0
-    meshes = []
-    for number, mesh in enumerate(header.get("meshes", [])):
-        primitives = []
-        for primitive in mesh["primitives"]:
-            if primitive.get("mode", _TRIANGLES) not in (_TRIANGLES, _STRIP):
-                others += 1
-                continue
-            attributes = {key: value for key, value in primitive["attributes"].items() if key in ("POSITION", "NORMAL")}
-            uv_set = f"TEXCOORD_{gltf_material.uv_set(header, primitive)}"
-            for key, source in (("_UV", uv_set), ("_COLOUR", "COLOR_0")):
-                if source in primitive["attributes"]:
-                    attributes[key] = primitive["attributes"][source]
-            used = [*attributes.values(), *([primitive["indices"]] if "indices" in primitive else [])]
-            for index in used:
-                if "sparse" in accessors[index]:
-                    raise file.fail(f"accessor {index} is sparse, which is not supported; save it plain")
-            entry = {key: value for key, value in primitive.items() if key in ("indices", "mode", "material")}
-            primitives.append(entry | {"attributes": attributes})
-            kept.append((number, primitives[-1]))
-        meshes.append({"name": f"{number}", "primitives": primitives})
-    if not kept:
-        raise file.fail("holds only points or lines, no triangles" if others else "holds no triangles")
-    _check_size(file, accessors, buffers, [primitive for _, primitive in kept])
-    plain = {
-        "asset": {"version": "2.0"},
-        "buffers": [{"uri": str(index), "byteLength": len(data)} for index, data in enumerate(buffers)],
-        "bufferViews": header.get("bufferViews", []),
-        "accessors": [{k: v for k, v in accessor.items() if k != "sparse"} for accessor in accessors],
-        "meshes": meshes,
-    }
-    resolver = {str(index): data for index, data in enumerate(buffers)}
-    parsed = parse("gltf", json.dumps(plain).encode(), resolver=resolver, skip_materials=True)
-    geometries = list(parsed["geometry"].values())
-    assert len(geometries) == len(kept)
-
-    def values(raw: Any, accessor: int) -> Float64:
-        """Returns an accessor's values as float64. Integers marked as normalized are fractions (glTF 2.0, 3.6.2.2)."""
-        raw = np.asarray(raw)
-        if raw.dtype.kind == "f" or not accessors[accessor].get("normalized", False):
-            return np.array(raw, dtype=np.float64)
-        fractions: Float64 = np.maximum(raw / np.iinfo(raw.dtype).max, -1.0)
-        return fractions
-
-    built: dict[int, list[tuple[Mesh, Material | None]]] = {}
-    materials: dict[int, Material] = {}
-    for (number, primitive), geometry in zip(kept, geometries, strict=True):
-        attributes = primitive["attributes"]
-        extra = geometry.get("vertex_attributes", {})
-        uvs = colours = normals = None
-        if "_UV" in attributes:
-            uvs = values(extra["_UV"], attributes["_UV"])
-            uvs[:, 1] = 1 - uvs[:, 1]  # in glTF v = 0 is the top of the picture
-        if "_COLOUR" in attributes:
-            colours = with_alpha(values(extra["_COLOUR"], attributes["_COLOUR"]))  # they are linear (glTF 2.0, 3.7.2.1)
-        if "NORMAL" in attributes:
-            normals = values(geometry["vertex_normals"], attributes["NORMAL"])
-        positions = values(geometry["vertices"], attributes["POSITION"])
-        where = f"mesh {number}: "
-        mesh = file.build(where, positions, np.asarray(geometry["faces"]), normals=normals, uvs=uvs, colours=colours)
-        material = None
-        if "material" in primitive:
-            index = primitive["material"]
-            if index not in materials:
-                materials[index] = gltf_material.material(file, header, buffers, header["materials"][index])
-            material = materials[index]
-        built.setdefault(number, []).append((mesh, material))
-
-    stored: dict[int, int] = {}
-    for name, number, transform in _nodes(file, header):
-        for index, (mesh, material) in enumerate(built.get(number, [])):
-            title = name or header["meshes"][number].get("name") or f"mesh {number}"
-            if len(built[number]) > 1:
-                title = f"{title}.{index + 1}"
-            known = stored.get(id(mesh))
-            file.contents.add(title, mesh if known is None else known, material, transform)
-            stored.setdefault(id(mesh), len(file.contents.meshes) - 1)
-
-
-def _check_size(
-    file: MeshFile, accessors: list[dict[str, Any]], buffers: list[bytes], primitives: list[dict[str, Any]]
-) -> None:
-    """Checks the number of triangles before they are read. Primitives may share accessors, and an accessor needs no data.
-
-    Errors: AssetError for more triangles than the file stores one by one, and than the limits allow.
-    """
-    used = [accessors[p["indices"] if "indices" in p else p["attributes"]["POSITION"]]["count"] for p in primitives]
-    vertices = [accessors[index]["count"] for p in primitives for index in p["attributes"].values()]
-    # An index takes at least one byte. A vertex takes more, and it may be shared by six triangles.
-    count = max(sum(used), sum(vertices) // 2)
-    if count > max(3 * file.limits.max_triangles, len(file.data) + sum(map(len, buffers))):
-        raise file.fail(
-            f"its meshes have {count // 3:,} triangles, more than it stores; {file.limits.max_triangles:,} are allowed: "
-            "see --max-triangles"
-        )
-
-
-def _nodes(file: MeshFile, header: dict[str, Any]) -> Iterator[tuple[str | None, int, Float64]]:
-    """Yields (name, number of the mesh, transform (4, 4) to file space) for every node with a mesh in the scene of the file.
+    """Adds a part for each primitive of each node of a glTF scene, and its cameras and lights. Nodes with one mesh share it.
 
     Errors: AssetError.
     """
-    nodes = header.get("nodes", [])
-    scenes = header.get("scenes", [])
-    children = {child for node in nodes for child in node.get("children", [])}
-    if scenes:
-        roots = scenes[header.get("scene", 0)].get("nodes", [])
-    else:
-        roots = [index for index in range(len(nodes)) if index not in children]
-        if nodes and not roots:
-            raise file.fail("its nodes form a cycle")
-    if not nodes:
-        yield from ((None, number, np.eye(4)) for number in range(len(header.get("meshes", []))))
-    # The nodes are visited depth first in the order of the file, and without recursion, because a chain of nodes may be longer
-    # than Python's stack is deep.
-    waiting: list[tuple[int, Float64, int | None]] = [(root, np.eye(4), None) for root in reversed(roots)]
-    # Node -> the node from which it was reached.
-    seen: dict[int, int | None] = {}
-    while waiting:
-        index, parent, above = waiting.pop()
-        if index in seen:
-            while above is not None and above != index:
-                above = seen[above]
-            if above is not None:
-                raise file.fail(f"its nodes form a cycle: node {index} is its own ancestor")
-            raise file.fail(f"node {index} has two parents; glTF nodes form a tree")
-        if not 0 <= index < len(nodes):
-            raise file.fail(f"node {index} does not exist")
-        seen[index] = above
-        node = nodes[index]
-        with np.errstate(all="ignore"):
-            transform = parent @ _transform(node)
-        if not np.isfinite(transform).all():
-            raise file.fail(f"node {index} has a transform that is not finite")
+    header, buffers = opened(file)
+    _check_extensions(file, header)
+    reader = _Reader(file, header, buffers)
+    nodes = Nodes(file, header)
+    lights = header.get("extensions", {}).get("KHR_lights_punctual", {}).get("lights", [])
+    for index in nodes.drawn():
+        node, world = nodes.tables[index], nodes.world[index]
         if "mesh" in node:
-            yield node.get("name"), node["mesh"], transform
-        waiting += [(child, transform, index) for child in reversed(node.get("children", []))]
+            reader.add(nodes, index)
+        if "camera" in node:
+            add_camera(file, node["camera"], header["cameras"][node["camera"]], node, world)
+        light = node.get("extensions", {}).get("KHR_lights_punctual", {}).get("light")
+        if light is not None:
+            if light >= len(lights):
+                raise file.fail(f"nodes[{index}]: light {light} does not exist; the file has {len(lights)} lights")
+            add_light(file, light, lights[light], world)
+    if not nodes.tables:
+        reader.add_loose()
+    if not file.contents.parts:
+        raise file.fail("holds nothing to draw: no visible node of its scene has a mesh with triangles, lines or points")
 
 
-def _transform(node: dict[str, Any]) -> Float64:
-    """Returns the transform (4, 4) from a node to its parent: its matrix, or its translation, rotation and scale."""
-    if "matrix" in node:
-        return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T  # glTF stores it column by column
-    result = np.eye(4)
-    x, y, z, w = np.array(node.get("rotation", (0.0, 0.0, 0.0, 1.0)), dtype=np.float64)
-    norm = x * x + y * y + z * z + w * w
-    s = 2 / norm if norm > 0 else 0.0
-    rotation = np.array(
-        [
-            [1 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
-            [s * (x * y + z * w), 1 - s * (x * x + z * z), s * (y * z - x * w)],
-            [s * (x * z - y * w), s * (y * z + x * w), 1 - s * (x * x + y * y)],
-        ]
-    )
-    result[:3, :3] = rotation * np.array(node.get("scale", (1.0, 1.0, 1.0)), dtype=np.float64)
-    result[:3, 3] = node.get("translation", (0.0, 0.0, 0.0))
-    return result
+def _check_extensions(file: MeshFile, header: dict[str, Any]) -> None:
+    """Refuses a file that needs an extension which is not followed, and warns of one that is only used. Errors: AssetError."""
+    known = FOLLOWED | HARMLESS | gltf_material.EXTENSIONS
+    needed = sorted(set(header.get("extensionsRequired", ())) - known)
+    if needed:
+        names = ", ".join(map(short, needed))
+        raise file.fail(f"needs the glTF extension {names}, which glshade does not read; save the file without it")
+    unused = sorted(name for name in set(header.get("extensionsUsed", ())) - known if not name.startswith(OF_MATERIALS))
+    if unused:
+        file.warn(f"the glTF extensions {', '.join(map(short, unused))} are not used; drawn without them")
+
+
+class _Reader:
+    """Builds the meshes of a file, each once for all nodes that show it in the same way."""
+
+    def __init__(self, file: MeshFile, header: dict[str, Any], buffers: list[bytes]) -> None:
+        """header: the JSON of the file, whose shape is checked. buffers: the bytes of its buffers.
+
+        Errors: AssetError for more triangles than the file stores and the limits allow.
+        """
+        self.file, self.header, self.buffers = file, header, buffers
+        self.accessors = Accessors(file, header, buffers)
+        self.meshes: list[dict[str, Any]] = header.get("meshes", [])
+        # Primitives may share accessors, so that all of them are counted before the first is read.
+        sizes = [gltf_geometry.size(self.accessors, primitive) for mesh in self.meshes for primitive in mesh["primitives"]]
+        self.accessors.spend(sum(corners for corners, _ in sizes), sum(values for _, values in sizes))
+        # Number of a mesh -> the primitives of which it consists.
+        self._geometry: dict[int, list[tuple[str, Geometry, Material]]] = {}
+        # Number of a material (-1: the default) -> its table.
+        self._materials: dict[int, Material] = {}
+        # What decides how a mesh looks -> its parts, each an index in the contents and a material.
+        self._built: dict[tuple[Any, ...], list[tuple[int | Mesh, Material]]] = {}
+
+    def add(self, nodes: Nodes, index: int) -> None:
+        """Adds the parts of a node with a mesh. Errors: AssetError."""
+        node = nodes.tables[index]
+        number, world = node["mesh"], nodes.world[index]
+        weights = tuple(node.get("weights", self.meshes[number].get("weights", ())))
+        skin = node.get("skin")
+        mirrored = float(np.linalg.det(world[:3, :3])) < 0
+        if skin is not None and self._is_skinned(number):
+            # The transform of a skinned mesh's node does not move it (glTF 2.0, 3.7.3.3), but still gives the winding (3.7.4).
+            self._place(node, number, (number, weights, skin, mirrored), np.eye(4), nodes)
+            return
+        copies = instances(self.accessors, node)
+        for transform in [world] if copies is None else world @ copies:
+            # A node whose scale is 0 along all axes is invisible (glTF 2.0, 3.5.3).
+            if transform[:3, :3].any():
+                key = (number, weights, transform.tobytes()) if is_flat(transform) else (number, weights)
+                self._place(node, number, key, transform, nodes)
+
+    def add_loose(self) -> None:
+        """Adds the meshes of a file without nodes. Errors: AssetError."""
+        for number, mesh in enumerate(self.meshes):
+            self._place({}, number, (number, tuple(mesh.get("weights", ()))), np.eye(4), None)
+
+    def _is_skinned(self, number: int) -> bool:
+        """Returns whether a primitive of a mesh names joints."""
+        return any(shape.joints is not None for _, shape, _ in self._shapes(number))
+
+    def _place(self, node: dict[str, Any], number: int, key: tuple[Any, ...], transform: Float64, nodes: Nodes | None) -> None:
+        """Adds the parts of a mesh at one place.
+
+        node: the JSON of the node.
+        number: the number of the mesh.
+        key: what decides how the mesh looks: its number, its morph weights, and optionally its skin and whether its node
+            mirrors, or the bytes of a transform that flattens it.
+        transform: (4, 4) to file space.
+
+        Errors: AssetError.
+        """
+        if key not in self._built:
+            self._built[key] = [
+                (mesh, material)
+                for where, shape, material in self._shapes(number)
+                if (mesh := self._mesh(where, shape, key, transform, nodes)) is not None
+            ]
+        parts = self._built[key]
+        if len(key) == 3:
+            transform = np.eye(4)
+        title = node.get("name") or self.meshes[number].get("name") or f"mesh {number}"
+        for place, (known, material) in enumerate(parts):
+            name = f"{title}.{place + 1}" if len(parts) > 1 else title
+            self.file.contents.add(name, known, material, transform)
+            if isinstance(known, Mesh):
+                parts[place] = len(self.file.contents.meshes) - 1, material
+
+    def _shapes(self, number: int) -> list[tuple[str, Geometry, Material]]:
+        """Returns the primitives of a mesh, each with its place in the file and its material. Errors: AssetError."""
+        if number not in self._geometry:
+            found = []
+            for index, primitive in enumerate(self.meshes[number]["primitives"]):
+                where = f"meshes[{number}].primitives[{index}]"
+                uv_set = gltf_material.uv_set(self.header, primitive)
+                shape = gltf_geometry.geometry(self.accessors, primitive, uv_set, where)
+                if shape is not None:
+                    found.append((where, shape, self._material(primitive.get("material", -1))))
+            self._geometry[number] = found
+        return self._geometry[number]
+
+    def _material(self, number: int) -> Material:
+        """Returns the table of a material; -1 stands for the default of glTF (glTF 2.0, 3.9.6). Errors: AssetError."""
+        if number not in self._materials:
+            given = {} if number < 0 else self.header["materials"][number]
+            place = "the default material" if number < 0 else f"materials[{number}]"
+            self._materials[number] = gltf_material.material(self.file, self.header, self.buffers, given, place)
+        return self._materials[number]
+
+    def _mesh(self, where: str, shape: Geometry, key: tuple[Any, ...], transform: Float64, nodes: Nodes | None) -> Mesh | None:
+        """Returns the mesh of a primitive as `_place` shows it; None where nothing is left to draw. Errors: AssetError."""
+        values = sum(map(len, shape.attributes.values()))
+        if len(self._built) >= len(self.meshes):
+            # A mesh that is posed in many ways makes more than the file stores.
+            self.accessors.spend(len(shape.order), values)
+        if shape.targets:
+            shape = gltf_geometry.morphed(shape, list(key[1]))
+        mirrored = False
+        if len(key) == 4 and nodes is not None:
+            shape, mirrored = gltf_geometry.skinned(self.file, shape, self._joints(key[2], nodes), where), key[3]
+        elif len(key) == 3:
+            shape, mirrored = gltf_geometry.transformed(shape, transform), False
+        return _built(self.file, where, shape, mirrored)
+
+    def _joints(self, number: int, nodes: Nodes) -> Float64:
+        """Returns the transforms (J, 4, 4) of the joints of a skin from the mesh's space to file space. Errors: AssetError."""
+        skin = self.header["skins"][number]
+        world: Float64 = nodes.world[skin["joints"]]
+        if "inverseBindMatrices" not in skin:
+            return world
+        index = skin["inverseBindMatrices"]
+        if self.accessors.count(index) < len(world):
+            raise self.file.fail(f"skins[{number}] has {len(world)} joints, but {self.accessors.count(index)} matrices")
+        self.accessors.spend(0, 4 * self.accessors.count(index))
+        matrices = self.accessors.floats(index, (16,))[: len(world)]
+        joints: Float64 = world @ matrices.reshape(-1, 4, 4).transpose(0, 2, 1)
+        if not np.isfinite(joints).all():
+            raise self.file.fail(f"skins[{number}].inverseBindMatrices hold numbers that are not finite")
+        return joints
+
+
+def _built(file: MeshFile, where: str, shape: Geometry, mirrored: bool) -> Mesh | None:
+    """Returns the mesh of a posed primitive; None where its topology gives nothing to draw.
+
+    mirrored: whether its triangles are wound clockwise, as seen from outside.
+
+    Errors: AssetError.
+    """
+    given = shape.attributes
+    uvs, colours, normals = given.get("TEXCOORD"), given.get("COLOR"), given.get("NORMAL")
+    if uvs is not None:
+        uvs = np.column_stack([uvs[:, 0], 1 - uvs[:, 1]])  # in glTF v = 0 is the top of the picture
+    if colours is not None:
+        colours = with_alpha(colours)  # they are linear (glTF 2.0, 3.7.2.1)
+    optional = {"normals": normals, "uvs": uvs, "colours": colours}
+    if shape.mode == POINTS:
+        return file.build_points(f"{where}: ", given["POSITION"], shape.order, **optional) if len(shape.order) else None
+    if shape.mode < TRIANGLES:
+        kind: Any = "lines" if shape.mode == LINES else "loop" if shape.mode == LINE_LOOP else "strip"
+        lines = segments(shape.order, kind)
+        return file.build_lines(f"{where}: ", given["POSITION"], lines, **optional) if len(lines) else None
+    triangles = gltf_geometry.triangles(shape)
+    if not len(triangles):
+        return None
+    if mirrored:
+        triangles = triangles[:, ::-1]
+    # Without normals every face is flat, and tangents do not count (glTF 2.0, 3.7.2.1).
+    further: dict[str, Any] = {}
+    if normals is None:
+        further["smoothing"] = np.zeros(len(triangles), dtype=np.int64)
+    elif "TANGENT" in given:
+        further["tangents"] = given["TANGENT"]
+    return file.build(f"{where}: ", given["POSITION"], triangles, **optional, **further)

@@ -1,209 +1,376 @@
-"""OBJ: the Wavefront format with its MTL files.
-
-The text is rewritten line by line in a strict form, which trimesh then parses.
-"""
+"""OBJ: the Wavefront format with its MTL files (Wavefront, Advanced Visualizer, appendix B1)."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from glshade.arrays import Float64
-from glshade.limits import MOST_LIBRARIES
+from glshade.arrays import Array, Float64, Int64, group_starts
+from glshade.limits import MOST_CORNERS, MOST_LIBRARIES
 from glshade.mesh.reading import mtl
-from glshade.mesh.reading.colours import srgb_to_linear, with_alpha
+from glshade.mesh.reading.colours import display_colours
 from glshade.mesh.reading.contents import Material
+from glshade.mesh.reading.faces import cut
 from glshade.mesh.reading.file import OUTSIDE, MeshFile, is_file, short, text_of
-from glshade.mesh.reading.parser import parse, triangles
+from glshade.mesh.reading.obj_text import ABSENT, BEYOND, FACE, LINE, POINT, ObjText, read_text
 from glshade.mesh.reading.polygon import triangulated
+from glshade.mesh.welding import weld
 
-
-@dataclass
-class _Faces:
-    """The triangles with one object name, one material and one form of corner (v, v/vt, v//vn or v/vt/vn).
-
-    lines: the corners of each triangle, as text.
-    numbers: the number of the line in the file from which each triangle comes, for messages.
-    """
-
-    lines: list[str] = field(default_factory=list)
-    numbers: list[int] = field(default_factory=list)
-
-
-# The number of "/" and the number of "//" in three corners -> the form of the corners.
-_FORMS = {(0, 0): "v", (3, 0): "v/vt", (6, 3): "v//vn", (6, 0): "v/vt/vn"}
+# The corners of a face. Cutting it takes about 200 bytes for each.
+LARGEST_FACE = 1 << 20
 
 
 def read(file: MeshFile) -> None:
-    """Adds a part for each object, material and form of corner in an OBJ file. Errors: AssetError."""
-    text = text_of(file.data).replace("\\\n", " ")
-    attributes: dict[str, list[str]] = {"v": [], "vt": [], "vn": []}
-    groups: dict[tuple[str, str | None, str], _Faces] = {}
-    libraries: list[str] = []
-    name, material = "", None
-    for number, line in enumerate(text.split("\n"), 1):
-        word, _, rest = line.strip().replace("\t", " ").partition(" ")
-        if word in attributes:
-            attributes[word].append(rest.partition("#")[0])
-        elif word == "f":
-            for form, corners in _corners(file, number, rest.partition("#")[0].strip(), attributes):
-                faces = groups.setdefault((name, material, form), _Faces())
-                faces.lines.append(corners)
-                faces.numbers.append(number)
-        elif word == "usemtl":
-            material = rest.strip()
-        elif word == "o":
-            name = rest.strip()
-        elif word == "mtllib":
-            libraries.append(rest.strip())
-    if not attributes["v"]:
-        raise file.fail("holds no vertices" if groups else "holds no vertices: not an OBJ file?")
-    if not groups:
-        raise file.fail("holds only points, no triangles")
-    groups = _in_range(file, attributes, groups)
+    """Adds a part for each object, material and form of corner in an OBJ file. Errors: AssetError.
 
-    # trimesh gets triangles, absolute indices, and one form of corner in each object, because its parser counts negative
-    # indices from the end of the file and assumes that all faces of an object have the form of the first.
-    strict = [f"{key} {line}" for key, lines in attributes.items() for line in lines]
-    for index, faces in enumerate(groups.values()):
-        strict.append(f"o {index}")
-        strict += [f"f {line}" for line in faces.lines]
-    options = {"skip_materials": True, "group_material": False, "split_objects": True}
-    geometries = parse("obj", "\n".join(strict).encode(), **options)["geometry"]
-    materials = _materials_of(file, libraries) if any(key[1] for key in groups) else {}
-
-    several_materials = len({key[:2] for key in groups}) > len({key[0] for key in groups})
-    for index, (name, material, form) in enumerate(groups):
-        geometry = geometries[str(index)]
-        title = name or (material if several_materials else "") or file.path.stem
-        if name and several_materials and material:
-            title = f"{name}.{material}"
-        colours = None
-        if geometry.get("vertex_colors") is not None:
-            raw = np.asarray(geometry["vertex_colors"], dtype=np.float64)
-            raw = raw / 255 if raw.max() > 1 else raw
-            colours = with_alpha(srgb_to_linear(raw))  # programs write sRGB-encoded bytes here, or those divided by 255
-        if material and materials and material not in materials:
-            file.warn(f"material '{material}' is in no material file; drawn without it")
-        mesh = file.build(
-            "",
-            geometry["vertices"],
-            triangles(geometry["faces"]),
-            normals=geometry.get("vertex_normals") if "vn" in form else None,
-            uvs=geometry["visual"].uv if "vt" in form else None,
-            colours=colours,
-        )
-        file.contents.add(title, mesh, materials.get(material) if material else None)
-
-
-def _corners(file: MeshFile, number: int, corners: str, attributes: dict[str, list[str]]) -> Iterator[tuple[str, str]]:
-    """Yields the form and the corners of each triangle of a face, with indices counted from the start of the file.
-
-    number: the number of the line, for messages.
-    corners: the text of the line without its first word.
-    attributes: the lines "v", "vt" and "vn" that were read so far, by their first word.
-
-    Errors: AssetError.
+    Where the file has no objects ("o"), its groups ("g") name the parts. Points and lines are parts of their own. A file that
+    holds nothing but vertices is a cloud of points.
     """
-    if corners.count(" ") == 2 and "-" not in corners and "/ " not in corners and corners[-1] != "/":
-        form = _FORMS.get((corners.count("/"), corners.count("//")))
-        if form is not None:
-            yield form, corners
-            return
-    tokens = corners.split()
-    if len(tokens) < 3:
-        raise file.fail(f"line {number}: a face needs three corners: 'f {corners}'")
-    counts = [len(attributes[key]) for key in ("v", "vt", "vn")]
-    resolved = []
-    for token in tokens:
-        try:
-            given = [int(part) if part else 0 for part in token.split("/")]
-        except ValueError:
-            raise file.fail(f"line {number}: '{token}' is not a corner of a face") from None
-        given = [index + count + 1 if index < 0 else index for index, count in zip(given, counts, strict=False)]
-        if min(given) < 0 or given[0] == 0:
-            raise file.fail(f"line {number}: face index out of range in '{token}'")
-        resolved.append([*given, 0, 0][:3])
-    has_uv, has_normal = all(r[1] for r in resolved), all(r[2] for r in resolved)
-    form = "v/vt/vn" if has_uv and has_normal else "v/vt" if has_uv else "v//vn" if has_normal else "v"
-    written = {
-        "v": "{0}",
-        "v/vt": "{0}/{1}",
-        "v//vn": "{0}//{2}",
-        "v/vt/vn": "{0}/{1}/{2}",
-    }[form]
-    texts = [written.format(*r) for r in resolved]
-    order = [(0, 1, 2)]
-    if len(tokens) > 3:
-        outline: Float64 | None = None
-        if max(r[0] for r in resolved) <= counts[0]:
-            outline = np.array([attributes["v"][r[0] - 1].split()[:3] for r in resolved], dtype=np.float64)
-        order = triangulated(outline) if outline is not None else [(0, k, k + 1) for k in range(1, len(tokens) - 1)]
-    for a, b, c in order:
-        yield form, f"{texts[a]} {texts[b]} {texts[c]}"
+    text = read_text(file)
+    if not len(text.positions):
+        raise file.fail("holds no vertices" if len(text.kinds) else "holds no vertices: not an OBJ file?")
+    if text.free_form:
+        file.warn("free-form curves and surfaces are not drawn")
+    if not len(text.kinds):
+        if text.free_form:
+            raise file.fail("holds only free-form curves and surfaces; export it as polygons")
+        colours = None if text.colours is None else display_colours(text.colours)
+        normals = text.normals if len(text.normals) == len(text.positions) else None
+        file.contents.add(file.path.stem, file.build_points("", text.positions, normals=normals, colours=colours))
+        return
+    _check_range(file, text)
+    _Parts(file, text).add()
 
 
-def _in_range(
-    file: MeshFile, attributes: dict[str, list[str]], groups: dict[tuple[str, str | None, str], _Faces]
-) -> dict[tuple[str, str | None, str], _Faces]:
-    """Returns the groups. References to uvs or normals that the file does not hold are removed, with a warning for the group.
+def _check_range(file: MeshFile, text: ObjText) -> None:
+    """Checks the elements of a file, and takes uvs and normals from those elements that name some which the file does not hold.
 
-    Errors: AssetError, with the number of the line, for a vertex that the file does not hold.
+    Errors: AssetError, with the number of the line.
     """
-    result: dict[tuple[str, str | None, str], _Faces] = {}
-    for (name, material, form), faces in groups.items():
-        kinds = [kind for kind in form.split("/") if kind]
-        try:
-            flat = np.fromstring(" ".join(faces.lines).replace("/", " "), dtype=np.int64, sep=" ")
-            table = flat.reshape(len(faces.lines), 3, len(kinds))
-        except ValueError:
-            numbered = zip(faces.numbers, faces.lines, strict=True)
-            number, line = next((n, x) for n, x in numbered if not re.fullmatch(r"[\d/ ]+", x))
-            raise file.fail(f"line {number}: 'f {line}' is not a face") from None
-        for column, kind in enumerate(kinds):
-            indices = table[:, :, column]
-            wrong = ((indices < 1) | (indices > len(attributes[kind]))).any(axis=1)
-            if not wrong.any():
-                continue
-            first = int(wrong.argmax())
-            message = f"line {faces.numbers[first]}: '{kind}' index out of range: the file has {len(attributes[kind])}"
-            if kind == "v":
-                raise file.fail(message)
-            file.warn(f"{message}; drawn without {'texture coordinates' if kind == 'vt' else 'normals'} there")
-            form = {"v/vt": "v", "v//vn": "v", "v/vt/vn": "v//vn" if kind == "vt" else "v/vt"}[form]
-        if form == "/".join(kinds) or (form == "v//vn" and kinds == ["v", "vn"]):
-            lines = faces.lines
+    faces = text.kinds == FACE
+    few = np.flatnonzero((faces & (text.counts < 3)) | ((text.kinds == LINE) & (text.counts < 2)))
+    if len(few):
+        least = "a face needs three corners" if faces[few[0]] else "a line needs two corners"
+        raise file.fail(f"line {text.lines[few[0]]}: {least}")
+    many = np.flatnonzero(faces & (text.counts > LARGEST_FACE))
+    if len(many):
+        counted = f"{text.counts[many[0]]:,} corners; {LARGEST_FACE:,} are allowed"
+        raise file.fail(f"line {text.lines[many[0]]}: a face has {counted}, so split it")
+    ends = np.cumsum(text.counts)
+    held = {"v": len(text.positions), "vt": len(text.uvs), "vn": len(text.normals)}
+    for column, (word, count) in enumerate(held.items()):
+        indices = text.corners[:, column]
+        wrong = np.flatnonzero(indices >= count)
+        if not len(wrong):
+            continue
+        elements = np.unique(np.searchsorted(ends, wrong, side="right"))
+        message = f"line {text.lines[elements[0]]}: '{word}' index out of range: the file has {count}"
+        if column == 0:
+            raise file.fail(message)
+        without = "texture coordinates" if word == "vt" else "normals"
+        others = f" and in {len(elements) - 1:,} more elements" if len(elements) > 1 else ""
+        file.warn(f"{message}; drawn without {without} there{others}")
+        chosen = np.zeros(len(text.kinds), dtype=bool)
+        chosen[elements] = True
+        indices[np.repeat(chosen, text.counts)] = ABSENT
+
+
+@dataclass
+class _States:
+    """The state in which each element is read.
+
+    names: the names of objects or groups that occur.
+    name: (E,) the index of the name of each element.
+    materials: the names of materials that occur, or None.
+    material: (E,) the index of the material of each element.
+    objects: (E,) the index of the object of each element. Normals are smooth across the parts of one object.
+    smoothing: (E,) the smoothing group of each element, 0 for none; None where the file says nothing about smoothing.
+    libraries: the rest of each "mtllib" line.
+    """
+
+    names: list[str]
+    name: Int64
+    materials: list[str | None]
+    material: Int64
+    objects: Int64
+    smoothing: Int64 | None
+    libraries: list[str]
+
+
+def _states(file: MeshFile, text: ObjText) -> _States:
+    by_word: dict[str, list[tuple[int, str]]] = {word: [] for word in ("o", "g", "s", "usemtl", "mtllib")}
+    for line, word, rest in text.states:
+        by_word[word].append((line, rest))
+
+    def values(word: str) -> tuple[list[str], Int64]:
+        """Returns the different values of a statement, "" as the first, and the index of the value for each element."""
+        table: dict[str, int] = {"": 0}
+        events = [table.setdefault(rest, len(table)) for _, rest in by_word[word]]
+        before = np.searchsorted([line for line, _ in by_word[word]], text.lines)
+        return list(table), np.array([0, *events], dtype=np.int64)[before]
+
+    objects, obj = values("o")
+    names, name = (objects, obj) if by_word["o"] else values("g")
+    materials, material = values("usemtl")
+    smoothing = None
+    if by_word["s"]:
+        words, group = values("s")
+        smoothing = np.array([_group(file, word) for word in words], dtype=np.int64)[group]
+    absent = {"", "(null)"}  # programs write "(null)" for no material
+    return _States(
+        names=names,
+        name=name,
+        materials=[None if x in absent else x for x in materials],
+        material=material,
+        objects=obj,
+        smoothing=smoothing,
+        libraries=[rest for _, rest in by_word["mtllib"]],
+    )
+
+
+def _group(file: MeshFile, word: str) -> int:
+    """Returns the number of a smoothing group. Until the first statement there is none, as the format says."""
+    if word in ("", "off"):
+        return 0
+    if word == "on":
+        return 1
+    try:
+        # Numbers of groups are labels; the remainder keeps a huge one within NumPy's integers.
+        return int(word) % (1 << 62)
+    except ValueError:
+        file.warn(f"'s {short(word)}' is no smoothing group; drawn without smoothing there")
+        return 0
+
+
+class _Parts:
+    """Divides the elements of a file into parts."""
+
+    def __init__(self, file: MeshFile, text: ObjText) -> None:
+        self._file, self._text = file, text
+        self._states = states = _states(file, text)
+        starts = np.cumsum(text.counts) - text.counts
+        kinds = np.minimum(text.kinds, POINT)
+        # A part has uvs, or normals, at all corners or at none.
+        form = np.zeros(len(kinds), dtype=np.int64)
+        full = text.counts > 0
+        for column in (1, 2):
+            has = text.corners[:, column] != ABSENT
+            if has.any():
+                complete = np.zeros(len(kinds), dtype=bool)
+                complete[full] = np.logical_and.reduceat(has, starts[full])
+                text.corners[np.repeat(~complete, text.counts), column] = ABSENT
+                form += complete * column
+        key = ((states.name * len(states.materials) + states.material) * 4 + form) * 8 + kinds
+        _, first, part = np.unique(key, return_index=True, return_inverse=True)
+        rank = np.empty(len(first), dtype=np.int64)
+        rank[np.argsort(first)] = np.arange(len(first))
+        # Elements of one part follow one another, and so do parts of one object.
+        self._part = rank[part]
+        self._order = np.argsort(self._part, kind="stable")
+        named = {(int(n), int(m)) for n, m in zip(states.name[first], states.material[first], strict=True)}
+        self._several_materials = len(named) > len({n for n, _ in named})
+        self._kinds_of: dict[tuple[int, int], set[int]] = {}
+        for element in first.tolist():
+            self._kinds_of.setdefault(self._key(element), set()).add(int(kinds[element]))
+        self._materials = self._found_materials()
+
+    def _key(self, element: int) -> tuple[int, int]:
+        return int(self._states.name[element]), int(self._states.material[element])
+
+    def _found_materials(self) -> dict[str, Material]:
+        """Returns the materials that the file uses, by name."""
+        states, file = self._states, self._file
+        used = {name for name in states.materials if name is not None}
+        materials = _materials_of(file, states.libraries) if states.libraries else {}
+        if used:
+            if materials:
+                for name in used - materials.keys():
+                    file.warn(f"material '{short(name)}' is in no material file; drawn without it")
+        elif len(materials) == 1:
+            # Scanners write such files, as those of the YCB objects; viewers such as MeshLab use the only material.
+            states.materials[0] = next(iter(materials))
+        elif materials:
+            file.warn(f"uses none of its {len(materials):,} materials: it has no 'usemtl'; drawn without them")
+        return {name: given() for name, given in materials.items() if name in states.materials}
+
+    def add(self) -> None:
+        """Adds all parts to the contents of the file. Errors: AssetError."""
+        text, order = self._text, self._order
+        corner_starts = np.cumsum(text.counts) - text.counts
+        counts = text.counts[order]
+        if (order[1:] < order[:-1]).any():
+            steps = np.arange(int(counts.sum())) - np.repeat(np.cumsum(counts) - counts, counts)
+            corners = text.corners[np.repeat(corner_starts[order], counts) + steps]
         else:
-            left = [kinds.index(kind) for kind in form.split("/") if kind]
-            glue = "//" if form == "v//vn" else "/"
-            lines = [" ".join(glue.join(str(corner[k]) for k in left) for corner in row) for row in table.tolist()]
-        merged = result.setdefault((name, material, form), _Faces())
-        merged.lines += lines
-        merged.numbers += faces.numbers
-    return result
+            corners = text.corners
+        part = self._part[order]
+        starts = group_starts(part)
+        ends = np.cumsum(counts)
+        colours = None if text.colours is None else display_colours(text.colours)
+        vertex, source = _vertices(corners, np.repeat(part, counts))
+        pieces = _Pieces(text, colours, corners, vertex, source)
+        surface: list[tuple[int, dict[str, Any]]] = []
+        bounds = [*starts.tolist(), len(order)]
+        for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+            element = int(order[begin])
+            chosen = order[begin:end]
+            at = slice(int(ends[begin] - counts[begin]), int(ends[end - 1]))
+            if surface and self._states.objects[surface[0][0]] != self._states.objects[element]:
+                self._add_surface(surface)
+                surface = []
+            kind = int(text.kinds[element])
+            if kind == FACE:
+                triangles, smoothing = self._triangles(chosen, counts[begin:end], corners[at, 0])
+                surface.append((element, pieces.arrays(at, triangles) | {"smoothing": smoothing}))
+                continue
+            self._add_strokes(element, kind, counts[begin:end], pieces, at)
+        if surface:
+            self._add_surface(surface)
+
+    def _triangles(self, elements: Int64, counts: Int64, positions: Array) -> tuple[Int64, Int64 | None]:
+        """Returns the triangles (T, 3) of faces, as indices of their corners, and the smoothing group (T,) of each."""
+        if (counts == 3).all():
+            triangles, polygon = np.arange(len(positions)).reshape(-1, 3), np.arange(len(counts))
+        else:
+            try:
+                triangles, polygon = cut(positions, counts, self._text.positions)
+            except ValueError:
+                raise self._file.fail(self._refused(elements, counts, positions)) from None
+        groups = self._states.smoothing
+        return triangles, None if groups is None else groups[elements[polygon]]
+
+    def _refused(self, elements: Int64, counts: Int64, positions: Array) -> str:
+        """Returns the message about the face that could not be cut."""
+        ends = np.cumsum(counts)
+        for face in np.flatnonzero(counts > MOST_CORNERS):
+            try:
+                triangulated(self._text.positions[positions[ends[face] - counts[face] : ends[face]]])
+            except ValueError as error:
+                return f"line {self._text.lines[elements[face]]}: {error}"
+        return "a face has too many corners"
+
+    def _add_surface(self, parts: list[tuple[int, dict[str, Any]]]) -> None:
+        """Adds the parts of one object; each has an element, for its name and material, and the arrays of its mesh."""
+        meshes = self._file.build_surface("", [arrays for _, arrays in parts])
+        for (element, arrays), mesh in zip(parts, meshes, strict=True):
+            if mesh is not None:
+                self._file.contents.add(self._title(element, FACE), mesh, self._material(element, "uvs" in arrays))
+
+    def _add_strokes(self, element: int, kind: int, counts: Int64, pieces: _Pieces, at: slice) -> None:
+        """Adds a part of points or lines."""
+        indices = np.arange(int(counts.sum()))
+        if kind == LINE:
+            inner = np.ones(len(indices), dtype=bool)
+            inner[np.cumsum(counts) - 1] = False  # a line does not go on into the next one
+            indices = np.stack([indices[inner], indices[inner] + 1], axis=1)
+        arrays = pieces.arrays(at, indices)
+        arrays.pop("normals", None)
+        strokes, positions = arrays.pop("triangles"), arrays.pop("positions")
+        build = self._file.build_lines if kind == LINE else self._file.build_points
+        material = self._material(element, "uvs" in arrays)
+        self._file.contents.add(self._title(element, kind), build("", positions, strokes, **arrays), material)
+
+    def _title(self, element: int, kind: int) -> str:
+        number, material = self._key(element)
+        name, given = self._states.names[number], self._states.materials[material] or ""
+        title = name or (given if self._several_materials else "") or self._file.path.stem
+        if name and given and self._several_materials:
+            title = f"{name}.{given}"
+        if kind != FACE and len(self._kinds_of[number, material]) > 1:
+            title += ".lines" if kind == LINE else ".points"
+        return title
+
+    def _material(self, element: int, has_uvs: bool) -> Material | None:
+        name = self._states.materials[self._states.material[element]]
+        material = self._materials.get(name) if name else None
+        if material is None or has_uvs:
+            return material
+        plain = mtl.plain(material)
+        if plain != material:
+            self._file.warn(f"material '{short(name or '')}' has textures, but faces without texture coordinates; drawn plain there")
+        return plain
 
 
-def _materials_of(file: MeshFile, libraries: list[str]) -> dict[str, Material]:
-    """Returns the materials by name. libraries: the text of each "mtllib" line without its first word."""
-    materials: dict[str, Material] = {}
+def _vertices(corners: Array, part: Array) -> tuple[Int64, Int64]:
+    """Returns the vertex (C,) of each corner, and a corner (V,) of each vertex.
+
+    Two corners of one part are one vertex if all their indices are equal. The parts must be in ascending order, and the vertices
+    are, too.
+    """
+    place, uv, normal = (corners[:, column].astype(np.int64) for column in range(3))
+    if part[-1] == 0 and all((other == place).all() or (other == ABSENT).all() for other in (uv, normal)):
+        # One number names all of a vertex, so that no table is needed to find equal corners.
+        used = np.zeros(int(place.max()) + 1, dtype=bool)
+        used[place] = True
+        vertex = (np.cumsum(used) - 1)[place]
+    else:
+        place <<= 32
+        place |= uv + 1
+        normal += 1
+        normal |= part.astype(np.int64) << 32
+        vertex = weld(place[:, None], normal[:, None])
+    source = np.empty(int(vertex.max()) + 1, dtype=np.int64)
+    source[vertex] = np.arange(len(vertex))
+    return vertex, source
+
+
+@dataclass
+class _Pieces:
+    """The arrays from which the meshes of all parts are taken.
+
+    colours: (V, 4) linear colours of the positions, or None.
+    corners: (C, 3) the corners of all parts in ascending order.
+    vertex: (C,) the vertex of each corner.
+    source: (V,) a corner of each vertex.
+    """
+
+    text: ObjText
+    colours: Float64 | None
+    corners: Array
+    vertex: Int64
+    source: Int64
+
+    def arrays(self, at: slice, triangles: Int64) -> dict[str, Any]:
+        """Returns the arguments of `Mesh.build` for the corners of one part. triangles: (T, 3) indices into these corners."""
+        own = self.vertex[at]
+        first = int(own.min())
+        place, uv, normal = self.corners[self.source[first : int(own.max()) + 1]].T
+        result: dict[str, Any] = {"positions": self.text.positions[place], "triangles": own[triangles] - first}
+        if uv[0] != ABSENT:
+            result["uvs"] = self.text.uvs[uv]
+        if normal[0] != ABSENT:
+            result["normals"] = self.text.normals[normal]
+        if self.colours is not None:
+            result["colours"] = self.colours[place]
+        return result
+
+
+def _materials_of(file: MeshFile, libraries: list[str]) -> dict[str, mtl.Given]:
+    """Returns the materials by name, each as a function that makes it. libraries: the rest of each "mtllib" line."""
+    materials: dict[str, mtl.Given] = {}
+    for path, name in _paths(file, libraries):
+        data = None if (outside := file.is_outside(path)) else file.read(path)
+        if data is None:
+            file.warn(f"material file '{short(name)}' {OUTSIDE if outside else 'not found'}; drawn without its materials")
+        else:
+            materials = mtl.materials(file, text_of(data)) | materials
+    return materials
+
+
+def _paths(file: MeshFile, libraries: list[str]) -> Iterator[tuple[Path, str]]:
+    """Yields the path and the name of each material file. Errors: AssetError."""
     seen: set[Path] = set()
     for line in libraries:
         # The whole line may be one name with spaces, or several names.
-        names = [line] if is_file(file.beside(line)) else line.split()
-        for name in names:
+        for name in [line] if is_file(file.beside(line)) else line.split():
             path = file.beside(name)
             if path in seen:
                 continue
             seen.add(path)
             if len(seen) > MOST_LIBRARIES:
                 raise file.fail(f"names more than {MOST_LIBRARIES} material files")
-            data = None if (outside := file.is_outside(path)) else file.read(path)
-            if data is None:
-                file.warn(f"material file '{short(name)}' {OUTSIDE if outside else 'not found'}; drawn without its materials")
-            else:
-                materials = mtl.materials(file, text_of(data)) | materials
-    return materials
+            yield path, name

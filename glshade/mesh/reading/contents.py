@@ -23,6 +23,8 @@ class Contents:
 
     meshes: the meshes, to which parts refer by index.
     parts: tables with the keys "name", "mesh" (an index), "transform" (a list of 4 rows) and "material" (or None).
+    cameras: name -> a camera, as a table of a scene file in file space.
+    lights: the lights, as tables of a scene file in file space.
     images: file name -> bytes, for each picture that the mesh file embeds.
     dependencies: path -> state, for each other file that was looked at. The state is the SHA-256 of the file's bytes, "present"
         where only the file's existence matters, or None where the file was missing.
@@ -32,6 +34,8 @@ class Contents:
     def __init__(self) -> None:
         self.meshes: list[Mesh] = []
         self.parts: list[dict[str, Any]] = []
+        self.cameras: dict[str, dict[str, Any]] = {}
+        self.lights: list[dict[str, Any]] = []
         self.images: dict[str, bytes] = {}
         self.dependencies: dict[str, str | None] = {}
         self.warnings: list[str] = []

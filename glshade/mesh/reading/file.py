@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from glshade.errors import AssetError
 from glshade.files import read_bytes
 from glshade.limits import DEFAULT, LARGEST_MESH, Limits
+from glshade.mesh.checking import Faults
 from glshade.mesh.mesh import Mesh
 from glshade.mesh.reading.contents import Contents
+from glshade.mesh.strokes import build_strokes
+from glshade.mesh.surface import build_surface
 
 # The end of a message about a file that must not be named.
 OUTSIDE = "lies outside the folders of the mesh and the scene's files (--allow-outside reads it)"
@@ -28,6 +34,7 @@ class MeshFile:
     limits: the limits of the scene that names the file.
     folders: the folders, without symbolic links, in which the file may name other files.
     normal_maps: picture file -> whether it holds normals, for the pictures that the reader has looked at.
+    faults: counts what was left out of the meshes of the file. The file gets one warning for each kind.
     """
 
     path: Path
@@ -37,6 +44,7 @@ class MeshFile:
     limits: Limits = DEFAULT
     folders: frozenset[Path] = frozenset()
     normal_maps: dict[Path, bool] = field(default_factory=dict)
+    faults: Faults = field(default_factory=Faults)
     # Folder -> the files in it, by their names in lower case.
     _listed: dict[Path, dict[str, Path]] = field(default_factory=dict)
     # Path -> the bytes that were read, because a file may name another one many times.
@@ -113,12 +121,43 @@ class MeshFile:
             self.warn(f"texture '{short(name)}' {OUTSIDE if outside else 'not found'}; drawn without it")
         return str(path) if found else None
 
-    def build(self, where: str, *arrays: Any, **named: Any) -> Mesh:
+    def build(self, where: str, positions: Any, triangles: Any, *arrays: Any, **named: Any) -> Mesh:
         """Returns the mesh that `Mesh.build` makes from these arrays. Errors: AssetError, with path and `where` in front."""
+        given = dict(zip(("normals", "uvs", "colours"), arrays, strict=False))
+        mesh = self.build_surface(where, [{"positions": positions, "triangles": triangles, **given, **named}])[0]
+        assert mesh is not None  # where no triangle is left, there was an error
+        return mesh
+
+    def build_surface(self, where: str, parts: Sequence[Mapping[str, Any]]) -> list[Mesh | None]:
+        """Returns the meshes of the parts of one surface, as in glshade.mesh.surface; None for a part that has no triangle left.
+
+        What is left out or replaced is counted in `faults`.
+        Errors: AssetError, with path and `where` in front.
+        """
         try:
-            return Mesh.build(*arrays, **named)
+            return build_surface(parts, self.faults)
         except AssetError as error:
             raise self.fail(f"{where}{error}") from None
+
+    def build_points(self, where: str, positions: Any, indices: Any = None, **named: Any) -> Mesh:
+        """Returns the mesh of the points with these indices (N,), by default of all vertices. The rest is as for `build_lines`."""
+        points = np.arange(len(positions)) if indices is None else np.asarray(indices).reshape(-1)
+        return self.build_lines(where, positions, np.stack([points, points], axis=1), **named)
+
+    def build_lines(self, where: str, positions: Any, lines: Any, **named: Any) -> Mesh:
+        """Returns the mesh that `build_strokes` makes of lines (S, 2) between vertices.
+
+        where: the place in the file, which precedes a message.
+        named: the optional arrays `normals`, `uvs` and `colours`.
+        Errors: AssetError. Warns where lines have positions that are not finite.
+        """
+        try:
+            mesh, lost = build_strokes(positions, lines, **named)
+        except AssetError as error:
+            raise self.fail(f"{where}{error}") from None
+        if lost:
+            self.warn(f"{where}{lost:,} points or lines have positions that are not finite numbers; drawn without them")
+        return mesh
 
 
 def short(name: str) -> str:

@@ -39,12 +39,16 @@ def written_out(scene: Scene) -> Scene:
     # An assembly of extreme size is in another unit of length. Its lights and its view would not fit the scene.
     if assembly.unit != 1:
         raise NotApplicableError("the scene is so small or large that it is drawn in another unit of length")
-    return scene.model_copy(update={"camera": camera_at(assembly.view), "lights": lights_of(scene)})
+    objects = tuple(item.model_copy(update={"file_lights": False}) if item.file_lights else item for item in scene.objects)
+    return scene.model_copy(update={"camera": camera_at(assembly.view), "lights": lights_of(scene), "objects": objects})
 
 
 def lights_of(scene: Scene) -> tuple[Light, ...]:
-    """Returns the scene's lights, or the default lights where it lists none."""
-    return assemble(scene).lights if scene.lights is None else scene.lights
+    """Returns the scene's lights with those of its mesh files, or the default lights where there are none."""
+    if scene.lights is not None and not any(item.file_lights for item in scene.objects):
+        return scene.lights
+    assembly = assemble(scene)
+    return assembly.lights[: assembly.own_light]
 
 
 def camera_at(view: View) -> Perspective | Orthographic:
@@ -131,7 +135,7 @@ def with_meshes(scene: Scene, change: Callable[[Object], Object | None]) -> Scen
     """Returns the scene with changes to its objects. A mesh file becomes one object for each of its parts.
 
     Blended objects stay as they are, because their triangles show through each other in the order in which they are drawn. So
-    does a mesh file that is the parent of another object.
+    does a mesh file that is the parent of another object, and so do points and lines, which have no triangles.
     change: a function that takes an object whose key `mesh` is a Mesh, and returns the changed object. None leaves the object
         unchanged.
     Errors: NotApplicableError if no object is changed.
@@ -143,14 +147,15 @@ def with_meshes(scene: Scene, change: Callable[[Object], Object | None]) -> Scen
     names: dict[str, list[str]] = {}
     changed = False
     for number, item in enumerate(scene.objects):
-        if number in kept or (item.name in parents and isinstance(item.mesh, Path)):
+        is_empty = item.mesh is None and item.shape is None
+        if is_empty or number in kept or (item.name in parents and isinstance(item.mesh, Path)):
             objects.append(item)
             continue
         parts = pieces(scene, item)
         if item.name is not None and len(parts) > 1:
             names[item.name] = [f"{item.name}/{index}" for index in range(len(parts))]
             parts = [part.model_copy(update={"name": name}) for part, name in zip(parts, names[item.name], strict=True)]
-        results = [change(part) for part in parts]
+        results = [change(part) if mesh_of(part).strokes is None else None for part in parts]
         changed = changed or any(results)
         objects += [result or part for result, part in zip(results, parts, strict=True)]
     if not changed:
@@ -177,12 +182,13 @@ def material_of(scene: Scene, item: Object) -> Brdf:
 
 
 def pieces(scene: Scene, item: Object) -> list[Object]:
-    """Returns an object for each mesh of an object of the scene."""
+    """Returns an object for each mesh of an object of the scene; none for an object that only has children."""
     if item.shape is not None:
         return [with_mesh(item, item.shape.mesh())]
     if isinstance(item.mesh, Mesh):
         return [item]
-    assert item.mesh is not None
+    if item.mesh is None:
+        return []
     found = []
     for part in scene.loader()(item.mesh).parts:
         piece = placed(with_mesh(item, part.mesh), item.transform.array() @ part.transform)

@@ -36,11 +36,11 @@ def _picture(scene: Scene, draw: Draw) -> NDArray[Any]:
 
 
 def _textured(material: Brdf, grey: Path) -> Brdf:
-    """Returns the material with a texture for each parameter that is a number or a colour."""
+    """Returns the material with a texture for emission and for each parameter that is a number or a colour."""
     return material.model_copy(
         update={
             name: Texture(texture=grey, factor=np.divide(value, LINEAR).tolist(), encoding="srgb")
-            for name in material.parameters()
+            for name in (*material.parameters(), "emission")
             if (value := getattr(material, name)) is not None and not isinstance(value, Texture)
         }
     )

@@ -21,7 +21,7 @@ def _picture(scene: Scene, draw: Draw) -> NDArray[Any]:
 def _reversed(item: Object) -> Object:
     """Returns the object with its vertices and triangles in reverse order, and each triangle starting at another corner."""
     mesh = mesh_of(item)
-    attributes = [field.name for field in fields(mesh) if field.name not in ("triangles", "origin")]
+    attributes = [field.name for field in fields(mesh) if field.name not in ("triangles", "origin", "neighbours")]
     arrays = {name: getattr(mesh, name)[::-1] for name in attributes if getattr(mesh, name) is not None}
     last = len(mesh.positions) - 1
     triangles = np.uint32(last) - mesh.triangles[::-1, [1, 2, 0]]

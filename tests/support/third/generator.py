@@ -49,6 +49,8 @@ class Generator:
     def __init__(self, folder: Path, *seed: int) -> None:
         self.folder = folder
         self.rng = np.random.default_rng(seed)
+        # The keys of `shown` have numbers of their own, so that scenes without them stay as they are.
+        self.further = np.random.default_rng((*seed, 1))
         self.name = "-".join(map(str, seed))
         self.files = 0
 
@@ -160,7 +162,22 @@ class Generator:
             material["bump_map"] = self.texture() | {"height": self.between(-0.08, 0.08)}
         if self.chance(0.1):
             material["sides"] = self.choice("front", "both")
-        return material
+        return material | self.shown(textured)
+
+    def shown(self, textured: bool) -> dict[str, Any]:
+        """Returns the keys of a material for emission, occlusion and unlit surfaces; often none."""
+        keys: dict[str, Any] = {}
+        kind = int(self.further.integers(6))
+        # The textures take their numbers from there, too.
+        self.rng, self.further = self.further, self.rng
+        if kind in (0, 1):
+            keys["emission"] = self.texture() | {"factor": self.colour()} if textured and kind else self.colour()
+        if kind in (1, 2) and textured:
+            keys["occlusion"] = self.texture() | {"strength": self.between(0, 1), "channel": self.choice("r", "g", "b")}
+        if kind == 3 and self.chance(0.5):
+            keys["unlit"] = True
+        self.rng, self.further = self.further, self.rng
+        return keys
 
     def reading(self, number: bool) -> dict[str, Any]:
         """Returns the keys of a texture that say how it is read. number: whether it is for a number."""
@@ -247,8 +264,8 @@ def features(scene: Mapping[str, Any]) -> set[str]:
 
     def walk(path: str, key: str, value: Any) -> None:
         if isinstance(value, Mapping):
-            is_texture = "texture" in value and not key.endswith("_map")
-            inside = "texture" if is_texture else key if key.endswith("_map") or key == "material" else path
+            own = key.endswith("_map") or key in ("material", "occlusion")
+            inside = key if own else "texture" if "texture" in value else path
             for name, item in value.items():
                 walk(f"{inside}.{name}", name, item)
         elif key in _NAMED and not isinstance(value, int):

@@ -77,7 +77,7 @@ class Thing:
         self.to_normal = np.linalg.inv(linear).T
         raw = mesh_of(item)
         self.both = self._both(raw)
-        self.mesh = with_normals(raw, item.get("normals", "auto"), item.get("threshold", 60.0))
+        self.mesh = with_normals(raw, item.get("normals", "auto"), item.get("threshold", 40.0))
         if self.model.anisotropic or self.maps:
             self.mesh = with_tangents(self.mesh)
         self.corners = self.mesh.positions @ linear.T + self.to_world[:3, 3]
@@ -346,23 +346,44 @@ def _minified(thing: Thing, view: View, triangle: Array, q: Array, pixel: float)
 def light_of(scene: Mapping[str, Any], thing: Thing, view: View, points: Points) -> Array:
     """Returns the light (N, 3) that points show to the viewer, linear Rec. 709."""
     m = parameters(thing, points)
+    exposure = 2.0 ** scene["film"].get("exposure", 0.0)
+    if thing.material.get("unlit"):
+        return (emission(thing, points) + (m[thing.model.base] if thing.model.base else thing.model.ambient(m))) * exposure
     n, t, b = _frame(thing, points)
     v = view.toward_viewer(points.p)
     lift = 2 * np.maximum(HORIZON - dot(n, v), 0)
     v = unit(v + lift * n)
-    total = np.zeros_like(points.p)
+    total, openness = emission(thing, points), _openness(thing, points)
     for light in scene["lights"]:
         if "only" in light and thing.item.get("name") not in light["only"]:
             continue
         if light["type"] == "ambient":
-            total += lights.intensity(light) * thing.model.ambient(m)
+            total += lights.intensity(light) * thing.model.ambient(m) * openness
             continue
         l, strength = lights.reaching(light, points.p)
         lit = np.flatnonzero((dot(n, l) > 0)[:, 0] & (dot(n, v) > 0)[:, 0])
         place = Place(n[lit], t[lit], b[lit], l[lit], v[lit])
         part = {name: value[lit] for name, value in m.items()}
         total[lit] += math.pi * strength[lit] * thing.model.f_cos(part, place)
-    return total * 2.0 ** scene["film"].get("exposure", 0.0)
+    return total * exposure
+
+
+def emission(thing: Thing, points: Points) -> Array:
+    """Returns the light (N, 3) that points emit, before the exposure."""
+    given = thing.material.get("emission", 0.0)
+    if isinstance(given, Mapping):
+        assert points.uv is not None
+        return np.maximum(textures.coloured(given, points.uv), 0.0)
+    return np.array(np.broadcast_to(np.asarray(given, dtype=np.float64), points.p.shape))
+
+
+def _openness(thing: Thing, points: Points) -> Array | float:
+    """Returns the factor of ambient light at points (N, 1)."""
+    given = thing.material.get("occlusion")
+    if given is None:
+        return 1.0
+    assert points.uv is not None
+    return 1.0 - given.get("strength", 1.0) * (1.0 - textures.numbered(given, points.uv))
 
 
 def parameters(thing: Thing, points: Points) -> dict[str, Array]:

@@ -11,7 +11,7 @@ from support.third.shapes import Mesh
 from support.third.vectors import Array, across, dot, single, unit
 
 # Angles count as equal if they differ by less than this [degrees].
-SAME_ANGLE = 1e-4
+SAME_ANGLE = 0.01
 # The tangents on both sides of a seam of the uvs are averaged if their sum is longer than this share of their lengths' sum.
 AGREEING = 0.95
 
@@ -53,7 +53,7 @@ def _fans(place: Array, faces: Array, threshold: float) -> Array:
     """Returns a number (T, 3) for each corner; corners with the same number share a normal.
 
     Two corners at one place share it if a chain of triangles round the place leads from one to the other, over edges that bend
-    by at most the threshold.
+    by less than the threshold.
     place: number of the place of each corner (T, 3).
     faces: unit normals (T, 3) of the triangles.
     """
@@ -67,7 +67,7 @@ def _fans(place: Array, faces: Array, threshold: float) -> Array:
             for other in triangles[i + 1 :]:
                 chord = np.linalg.norm(faces[one] - faces[other])
                 bend = 2 * math.degrees(math.asin(min(chord / 2, 1)))
-                if bend > threshold + SAME_ANGLE:
+                if bend >= max(threshold - SAME_ANGLE, SAME_ANGLE) and threshold < 180:
                     continue
                 for end in ends:
                     first, second = (group[t][place[t] == end][0] for t in (one, other))

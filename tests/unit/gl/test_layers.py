@@ -173,7 +173,7 @@ def test_storage_is_of_the_picture_alone(renderer: g.Renderer, scene: Any) -> No
 
 # The largest difference of each part from the reference, at pixels where no driver could see another surface. That of depth and
 # uv comes from snapping corners to 1/256 pixel; that of textured parts from texture filters with weights of 8 bits.
-TOLERANCE = {"depth": 2e-3, "uv": 2e-3, "normal": 2e-2, "unlit": 1e-6, "albedo": 0.1, "specular": 0.1, "light": 0.1}
+TOLERANCE = {"depth": 2e-3, "uv": 2e-3, "normal": 2e-2, "dark": 1e-6, "albedo": 0.1, "specular": 0.1, "light": 0.1}
 
 
 @pytest.mark.parametrize("shading", [None, "flat", "gouraud"])

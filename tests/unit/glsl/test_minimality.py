@@ -25,7 +25,7 @@ from glshade.glsl.plan import ProgramPlan
 from glshade.glsl.planner import plan_instance
 from glshade.glsl.shaders import SHIPPED
 from glshade.glsl.source import Source, Stage
-from glshade.glsl.uniforms import light_uniforms, object_uniforms, textures
+from glshade.glsl.uniforms import exposed_uniforms, light_uniforms, object_uniforms, textures
 from glshade.lights import FALLOFFS
 from glshade.verification.trials import VISIBLE
 
@@ -112,7 +112,7 @@ class TestNothingElseIsThere:
         values = {"u_clip_from_world", *object_uniforms(plan, instance, assembly.view.eye), *textures(plan, instance.material)}
         values |= set(light_uniforms(plan, assembly, instance.lights, 0.0))
         values |= {"u_viewer"} if plan.directed and plan.viewer == "orthographic" else set()
-        values |= {"u_ambient_radiance"} if plan.ambient == "constant" else set()
+        values |= set(exposed_uniforms(plan, instance, assembly, 0.0))
         values |= {f"u_{group.key}_count" for group in plan.lights if not group.count}
         # A light that does not fall off has no r_min.
         values -= {f"u_{group.key}_r_min" for group in plan.lights if group.falloff == "none"}
@@ -222,7 +222,9 @@ def without(plan: ProgramPlan) -> Iterator[tuple[str, Source]]:
         yield f"light {group.key}", generate(replace(plan, lights=tuple(other for other in plan.lights if other != group)))
     for name in plan.textured:
         source = generate(plan)
-        read = re.compile(rf"(^    m\.{name} = .*?)texture\([^()]*\)", re.M)
+        # Emission and occlusion have functions of their own; a parameter is set in the function of the material.
+        start = rf"m\.{name} = " if name not in ("emission", "occlusion") else rf"return .*u_{name} \* "
+        read = re.compile(rf"(^    {start}.*?)texture\([^()]*\)", re.M)
         assert any(read.search(stage.text) for stage in (source.vertex, source.fragment) if stage)
         yield f"texture of {name}", Source(*(white(stage, read) for stage in (source.vertex, source.fragment) if stage))
     changes: dict[str, dict[str, Any]] = {
@@ -236,6 +238,8 @@ def without(plan: ProgramPlan) -> Iterator[tuple[str, Source]]:
         "both sides": {"both_sides": False} if plan.both_sides else {},
         "alpha": {"alpha": "opaque", "alpha_from": None} if plan.alpha != "opaque" else {},
         "alpha of a texture": {"alpha_from": None} if plan.alpha_from else {},
+        "emission": {"emission": "unused"} if plan.emission != "unused" else {},
+        "occlusion": {"occlusion": "unused"} if plan.occlusion != "unused" else {},
     }
     for feature, change in changes.items():
         if change:

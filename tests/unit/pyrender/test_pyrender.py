@@ -168,6 +168,29 @@ def test_a_normal_map_needs_texture_coordinates() -> None:
     assert without.normal_map is None
 
 
+def test_emission_has_the_square_of_its_factor_as_in_pyrender() -> None:
+    made = the_material(square(rough(emissiveFactor=np.array([0.5, 1.0, 0.0]))))
+    assert made.emission == (0.25, 1.0, 0.0)
+    picture = texture(np.full((2, 2, 3), 128))
+    textured = the_material(square(rough(emissiveFactor=np.full(3, 0.5), emissiveTexture=picture))).emission
+    assert isinstance(textured, Texture)
+    assert textured.factor == (0.25, 0.25, 0.25)
+    without = the_material(square(rough(emissiveFactor=np.full(3, 0.5), emissiveTexture=picture), texcoord_0=None))
+    assert without.emission == (0.25, 0.25, 0.25)
+
+
+def test_occlusion_is_read_from_red() -> None:
+    made = the_material(square(rough(occlusionTexture=texture(np.full((2, 2), 128)))))
+    assert (made.occlusion.channel, made.occlusion.strength) == ("r", 1.0)
+    assert the_material(square(rough())).occlusion is None
+
+
+def test_a_glowing_square_is_drawn_without_light(offscreen: OffscreenRenderer) -> None:
+    """pyrender's own picture has the code 255 (0.25)^(1/2.2)."""
+    pixels = offscreen.render(stage(node(square(rough(emissiveFactor=np.full(3, 0.5))))))[0]
+    assert pixels[HEIGHT // 2, WIDTH // 2].tolist() == [round(255 * 0.25 ** (1 / 2.2))] * 3
+
+
 def test_only_transparent_surfaces_are_blended() -> None:
     """pyrender marks every material that comes from trimesh as blended."""
     assert the_material(square(rough(alphaMode="BLEND"))).alpha_mode == "opaque"
@@ -187,11 +210,7 @@ def test_only_transparent_surfaces_are_blended() -> None:
 
 @pytest.mark.parametrize(
     ("changes", "message"),
-    [
-        ({"emissiveFactor": np.ones(3), "name": "lamp"}, "^pyrender: material 'lamp': emission not used"),
-        ({"occlusionTexture": texture(np.ones((2, 2)))}, "ambient occlusion not used"),
-        ({"wireframe": True}, "wireframes are drawn solid"),
-    ],
+    [({"wireframe": True}, "wireframes are drawn solid")],
 )
 def test_unsupported_parts_of_a_material_are_warned_of(changes: dict[str, Any], message: str) -> None:
     with pytest.warns(AssetWarning, match=message):

@@ -147,9 +147,9 @@ def test_files_are_found_beside_the_scene(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_every_mesh_that_is_missing_or_broken(tmp_path: Path) -> None:
     write(tmp_path / "empty.obj", "")
-    write(tmp_path / "points.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\n")
+    write(tmp_path / "lines.obj", "v 0 0 0\nv 1 0 0\nl 1 3\n")
     (tmp_path / "cut.stl").write_bytes(b"\x00" * 90)
-    names = ["empty.obj", "points.obj", "cut.stl"]
+    names = ["empty.obj", "lines.obj", "cut.stl"]
     messages = problems(write(tmp_path / "a.json", {"objects": [{"mesh": name} for name in names]}))
     assert len(messages) == len(names)
     for index, (name, problem) in enumerate(zip(names, messages, strict=True)):
@@ -162,11 +162,9 @@ def test_every_mesh_that_is_missing_or_broken(tmp_path: Path) -> None:
     assert all("does not exist" in problem for problem in messages)
 
 
-@pytest.mark.parametrize("name", ["empty.obj", "points.ply", "empty.stl", "none.glb"])
-def test_a_bare_mesh_without_triangles(name: str, tmp_path: Path) -> None:
-    header = (
-        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nproperty float y\nproperty float z\nend_header\n0 0 0\n"
-    )
+@pytest.mark.parametrize("name", ["empty.obj", "none.ply", "empty.stl", "none.glb"])
+def test_a_bare_mesh_with_nothing_to_draw(name: str, tmp_path: Path) -> None:
+    header = "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nproperty float y\nproperty float z\nend_header\n"
     write(tmp_path / name, header if name.endswith("ply") else "")
     (problem,) = problems(tmp_path / name)
     assert name in problem
