@@ -6,6 +6,7 @@ values are allowed, and name the key or value with the most similar spelling.
 
 import difflib
 from collections.abc import Iterable, Mapping
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from typing import Annotated, Any
@@ -229,13 +230,17 @@ def _triple(value: Any) -> Any:
     return tuple(value)
 
 
-def resolved(path: Path, info: ValidationInfo) -> Path:
-    """Returns the path of a file, taken relative to the folder of the scene file; refuses a path where there is no file."""
+def resolved(path: Path, info: ValidationInfo, folders: bool = False) -> Path:
+    """Returns the path of a file, taken relative to the folder of the scene file; refuses a path where there is no file.
+
+    folders: whether the path may also be that of a folder.
+    """
     folder = (info.context or {}).get("folder")
     try:
         path = path.expanduser()
         path = path if path.is_absolute() or folder is None else Path(folder) / path
-        check_regular(path)
+        if not (folders and path.is_dir()):
+            check_regular(path)
     except (FileNotFoundError, NotADirectoryError):
         raise fault(f"{path} does not exist") from None
     except IsADirectoryError:
@@ -258,6 +263,7 @@ Triple = Annotated[
 ]
 # The path of a file that exists; a relative path starts at the folder of the scene file.
 File = Annotated[Path, AfterValidator(resolved)]
+FileOrFolder = Annotated[Path, AfterValidator(partial(resolved, folders=True))]
 
 
 def non_zero(value: Vector3) -> Vector3:

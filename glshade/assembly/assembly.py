@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -23,6 +23,7 @@ from glshade.assembly.default_rig import rig
 from glshade.assembly.instance import Instance
 from glshade.assembly.strokes import Viewport, stroked
 from glshade.brdfs import BRDFS, Brdf
+from glshade.calibration.calibration import Calibration
 from glshade.errors import AssetWarning, SceneError
 from glshade.lights import LIGHTS, Light
 from glshade.limits import LARGEST_NUMBER, SMALLEST_NUMBER
@@ -34,7 +35,7 @@ from glshade.mesh.order import ordered
 from glshade.mesh.reading.textures import plain
 from glshade.mesh.tangents import OWN_AXES, Axes, with_tangents
 from glshade.mesh.winding import turned_over
-from glshade.scene.camera import View
+from glshade.scene.camera import View, calibration_of
 from glshade.scene.object import Normals, Object, Rate
 from glshade.scene.of_files import file_lights, placed
 from glshade.scene.of_files import world as world_of
@@ -63,6 +64,7 @@ class Assembly:
     instances: the instances, in the order of the scene's objects.
     lights: the scene's lights, or the default rig where the scene lists none; with unlit materials, also `WHITE` at the end.
     view: the camera at its final position.
+    objects: name of an object -> transform (4, 4) to world space [scene units].
     unit: the factor of all lengths. It differs from 1 only if the squares of lengths would leave the range of float32.
     own_light: index of the light that shows the base colours of unlit materials; None if no material is unlit.
     """
@@ -70,8 +72,29 @@ class Assembly:
     instances: tuple[Instance, ...]
     lights: tuple[Light, ...]
     view: View
+    objects: Mapping[str, Array] = field(default_factory=dict)
     unit: float = 1.0
     own_light: int | None = None
+
+    def calibration(self, scene: Scene) -> Calibration:
+        """Returns how the picture of a scene is seen: the pixels of its window, the camera's pose, and those of its objects.
+
+        scene: the scene of this assembly, with the film of the picture.
+        """
+        view = self.view
+        if self.unit != 1:
+            across = 1.0 if view.perspective else self.unit
+            view = replace(
+                view,
+                eye=view.eye / self.unit,
+                near=view.near / self.unit,
+                far=view.far / self.unit,
+                half_width=view.half_width / across,
+                half_height=view.half_height / across,
+            )
+        left, top, width, height = scene.film.window
+        whole = calibration_of(view, scene.film.size, self.objects)
+        return replace(whole, size=(width, height), cx=whole.cx - left, cy=whole.cy - top)
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +136,7 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
     shading: optional, the shading rate of all objects in place of their own.
     Errors: SceneError (AssetError) with all faults of meshes, materials and missing texture coordinates.
     """
-    pieces = _pieces(scene, shading)
+    pieces, objects = _pieces(scene, shading)
     check_texels((piece.material for piece in pieces), scene.limits)
     view = _view(scene, pieces)
     own = file_lights(scene, scene.loader())
@@ -126,16 +149,20 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
     if problems:
         raise SceneError(problems)
     unlit = any(len(lights) in instance.lights for instance in instances)
-    assembly = Assembly(instances, (*lights, WHITE) if unlit else tuple(lights), view, own_light=len(lights) if unlit else None)
+    shown = (*lights, WHITE) if unlit else tuple(lights)
+    assembly = Assembly(instances, shown, view, objects, own_light=len(lights) if unlit else None)
     return _in_range(assembly, np.concatenate([piece.box for piece in pieces]))
 
 
-def _pieces(scene: Scene, shading: Rate | None) -> list[_Piece]:
-    """Returns the meshes of all objects. shading: as in `assemble`.
+def _pieces(scene: Scene, shading: Rate | None) -> tuple[list[_Piece], dict[str, Array]]:
+    """Returns the meshes of all objects, and the transform to world space of each object by its name.
+
+    shading: as in `assemble`.
 
     Errors: SceneError with the faults of all mesh files and their materials, or where the scene exceeds a limit.
     """
     pieces: list[_Piece] = []
+    objects: dict[str, Array] = {}
     problems: list[str] = []
     placements = placed(scene.objects)
     load = scene.loader()
@@ -145,13 +172,14 @@ def _pieces(scene: Scene, shading: Rate | None) -> list[_Piece]:
         if not _is_in_range(world):
             problems.append(f"objects[{number}].transform: together with the parents' it is too large or too small")
             continue
+        objects[item.name or f"objects[{number}]"] = world
         try:
             pieces.extend(_pieces_of(scene, load, number, item, world))
         except SceneError as error:
             problems.extend(f"objects[{number}].mesh: {problem}" for problem in error.problems)
     if problems:
         raise SceneError(problems)
-    return pieces
+    return pieces, objects
 
 
 def _view(scene: Scene, pieces: list[_Piece]) -> View:
@@ -264,6 +292,7 @@ def _in_range(assembly: Assembly, corners: Array) -> Assembly:
             half_width=view.half_width * across,
             half_height=view.half_height * across,
         ),
+        assembly.objects,
         unit,
         assembly.own_light,
     )

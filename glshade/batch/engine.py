@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import traceback
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Protocol
@@ -34,6 +34,7 @@ class Outcome:
     seconds: time of the whole batch [s]
     seconds_pictures: time from the start of the first picture's drawing until the last file was closed [s]
     codes: exit codes of the failed pictures
+    seen: number of a picture -> how it was seen, for the pictures that were drawn
     """
 
     pictures: int
@@ -43,6 +44,7 @@ class Outcome:
     seconds: float = 0.0
     seconds_pictures: float = 0.0
     codes: set[int] = field(default_factory=set)
+    seen: dict[int, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
     def left(self) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import filecmp
 import hashlib
+import json
 import warnings
 from collections import OrderedDict
 from collections.abc import Sequence
@@ -118,7 +119,8 @@ class Maker:
             scene = self.scene(task)
         driver = "float64 reference" if task.reference else self.driver
         name = picture_digest(scene, task, driver, self.code)
-        record = Record(task.number, task.output, "done", name, driver=driver, device=self.device)
+        sample = self._file(task).drawn(task.frame)
+        record = Record(task.number, task.output, "done", name, driver=driver, device=self.device, sample=sample)
         files = _files(task, scene)
         if task.resume and task.known[:1] == (name,):
             kept = replace(record, state="skipped", **_contents(files))
@@ -129,7 +131,9 @@ class Maker:
         seconds = {"load": loaded - start, "draw": perf_counter() - loaded}
         # The digest in a file's header says nothing about the rest of the file. So the file is compared with the new picture.
         compared = task.resume and all(digest_of(file) == name for file in files)
-        return Drawn(picture, files, replace(record, seconds=seconds, started=started), compared)
+        image = picture if isinstance(picture, Image) else picture.image
+        seen = json.loads(image.calibration.json()) if image.calibration else {}
+        return Drawn(picture, files, replace(record, seconds=seconds, started=started, seen=seen), compared)
 
     def _picture(self, task: Task, scene: Scene) -> Image | Layers:
         linear = format_of(task.output).floats
@@ -148,16 +152,20 @@ class Maker:
 
     def scene(self, task: Task) -> Scene:
         """Returns the scene that a task draws. Errors: SceneError."""
+        original = self._file(task).scene(task.frame, task.camera)
+        changes = dict(task.film), task.settings
+        if self._filmed is None or self._filmed[0] is not original or self._filmed[1] != changes:
+            self._filmed = original, changes, _changed(original, task)
+        return self._filmed[2]
+
+    def _file(self, task: Task) -> SceneFile:
+        """Returns the scene file of a task with its overrides. Errors: SceneError."""
         key = task.scene, task.overrides, tuple(task.limits.items())
         file = self._files.pop(key, None) or SceneFile(task.scene, task.overrides, Limits(**task.limits))
         self._files[key] = file
         if len(self._files) > KEPT_FILES:
             self._files.popitem(last=False)
-        original = file.scene(task.frame, task.camera)
-        changes = dict(task.film), task.settings
-        if self._filmed is None or self._filmed[0] is not original or self._filmed[1] != changes:
-            self._filmed = original, changes, _changed(original, task)
-        return self._filmed[2]
+        return file
 
 
 @dataclass(frozen=True, eq=False)

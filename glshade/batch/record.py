@@ -32,6 +32,8 @@ class Record:
     stops: True if the next pictures would fail for the same reason, such as a full disk or a folder without write permission
     warnings: messages of the warnings raised while the picture was made
     layers_sha256: SHA-256 of the separate file of layers; "" if the picture has none
+    seen: how the picture was seen, as `Calibration.as_dict`; empty if it was not drawn
+    sample: the values that were drawn at random, by their dotted keys
     """
 
     number: int
@@ -51,6 +53,8 @@ class Record:
     stops: bool = False
     warnings: tuple[str, ...] = ()
     layers_sha256: str = ""
+    seen: Mapping[str, Any] = field(default_factory=dict)
+    sample: Mapping[str, Any] = field(default_factory=dict)
 
     @property
     def known(self) -> tuple[str, ...]:

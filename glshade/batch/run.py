@@ -44,6 +44,8 @@ def run_batch(
             if manifest is not None:
                 manifest.add(by_number[record.number], record)
             setattr(outcome, record.state, getattr(outcome, record.state) + 1)
+            if record.seen:
+                outcome.seen[record.number] = record.seen
             if record.state == "failed":
                 outcome.codes.add(record.exit_code)
             if record.state == "done" and record.started:

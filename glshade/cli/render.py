@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import warnings
 from collections.abc import Mapping, Sequence
@@ -13,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from glshade.calibration.formats import FORMATS as CAMERA_FORMATS
 from glshade.cli._options import Crop, Duration, Size, driver, filmed, limits, models, overrides, point_size, shaders
 from glshade.image.formats import FORMATS
 from glshade.limits import DEFAULT, MOST_TASKS, Limits
@@ -41,6 +43,24 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--camera", "cameras", multiple=True, metavar="NAME", help="Renders through one of the scene's `cameras`; repeatable."
+)
+@click.option(
+    "--cameras-from",
+    type=click.Path(path_type=Path, exists=True),
+    metavar="PATH",
+    help="Renders through each camera of a file or folder, such as --cameras writes; with --camera, only through those.",
+)
+@click.option(
+    "--cameras",
+    "cameras_file",
+    type=click.Path(path_type=Path),
+    metavar="PATH",
+    help="Writes how each picture was seen to a file, or to a folder (colmap, bop).",
+)
+@click.option(
+    "--cameras-format",
+    type=click.Choice(CAMERA_FORMATS),
+    help="Format of --cameras. [default: nerf for transforms.json, opencv for other .json files, else colmap]",
 )
 @click.option(
     "--sweep",
@@ -134,6 +154,9 @@ def command(
     output: str | None,
     frames: str | None,
     cameras: tuple[str, ...],
+    cameras_from: Path | None,
+    cameras_file: Path | None,
+    cameras_format: str | None,
     sweeps: tuple[str, ...],
     overwrite: bool,
     skip_existing: bool,
@@ -179,6 +202,13 @@ def command(
         raise click.UsageError("--overwrite, --skip-existing and --resume exclude each other")
     film |= {"samples": samples and int(samples), "ocio": ocio and _configuration(ocio), "aovs": _names(aovs)}
     film = {key: value for key, value in film.items() if value is not None}
+    if cameras_format and cameras_file is None:
+        raise click.UsageError("--cameras-format needs --cameras, which names the file to write")
+    if cameras_from is not None:
+        from glshade.calibration.file import named
+
+        cameras = cameras or tuple(named(cameras_from))
+        overrides = [("cameras_from", json.dumps(str(cameras_from.absolute()))), *overrides]
     pictures = _pictures(scenes, frames, cameras, output, sweeps, max_tasks)
     raised = {name: value for name, value in asdict(limits).items() if value != getattr(DEFAULT, name)}
     common = {"limits": raised, "film": film, "shading": shading, "reference": reference, "tile": tile, "resume": resume}
@@ -223,6 +253,8 @@ def command(
         if log is not None and resume:
             wanted = [replace(task, known=log.known(task.output)) for task in wanted]
         outcome = run_batch(wanted, workers, log, display, skipped=skipped, since=since)
+        if cameras_file is not None:
+            _write_cameras(cameras_file, cameras_format, tasks, outcome.seen, display)
     if several:
         # A worker of a command that was killed may have been alive when this batch began, and have ended since.
         leftovers.remove(task.output for task in wanted)
@@ -271,6 +303,17 @@ def _task(number: int, picture: Shot, overrides: Sequence[tuple[str, str]], comm
     changes = (*overrides, *picture.overrides)
     scene, output = str(picture.scene), str(picture.output)
     return Task(number, scene, output, changes, picture.frame, picture.camera, **common)
+
+
+def _write_cameras(
+    path: Path, name: str | None, tasks: Sequence[Task], seen: Mapping[int, Mapping[str, Any]], display: Plain
+) -> None:
+    """Writes how the pictures were seen. The arguments are those of `batch.cameras.write`. Errors: GlshadeError."""
+    from glshade.batch import cameras
+    from glshade.calibration.file import usual_format
+
+    for missing in cameras.write(path, name or usual_format(path), tasks, seen):
+        display.warn(f"{path}: lacks {missing}, which existed and does not tell how it was seen")
 
 
 def _refuse_existing(tasks: Sequence[Task]) -> None:

@@ -215,8 +215,8 @@ def positions(depth: NDArray[np.float64], assembly: Assembly, film: Film) -> NDA
     film: the scene's film.
     """
     view, (x, y, w, h), (width, height) = assembly.view, film.window, film.size
-    across = (2 * (x + np.arange(w) + 0.5) / width - 1)[None, :] * view.half_width
-    up = (1 - 2 * (y + np.arange(h) + 0.5) / height)[:, None] * view.half_height
+    across = (2 * (x + np.arange(w) + 0.5) / width - 1 - view.centre[0])[None, :] * view.half_width
+    up = (1 - 2 * (y + np.arange(h) + 0.5) / height - view.centre[1])[:, None] * view.half_height
     # In a parallel view, half_width and half_height are lengths in the assembly's unit, and depth does not spread the rays.
     spread = depth if view.perspective else np.float64(1 / assembly.unit)
     right, above, backward = view.axes

@@ -290,6 +290,7 @@ class Renderer:
             {"glshade:renderer": self._drawn_by} if on_gpu else self._attributes(prepared),
             (left, top),
             film.size if film.crop else None,
+            prepared.assembly.calibration(scene),
         )
         if on_gpu or dtype == "float32":
             return image
@@ -396,7 +397,6 @@ class Renderer:
                 "glshade:version": __version__,
                 "glshade:renderer": self._drawn_by,
                 "glshade:scene": scene_digest(prepared.scene),
-                "glshade:camera": prepared.scene.camera.model_dump_json(exclude_none=True),
             }
         return prepared.attributes
 

@@ -20,6 +20,7 @@ class PictureContents:
     premultiplied: True where the colours are multiplied by alpha.
     channels: optional names of the C channels; by default R, G, B, A.
     attributes: texts about the picture, by name. Reading leaves them out.
+    matrices: matrices (4, 4) about the picture, by OpenEXR's names, for row vectors. Only formats with `matrices` hold them.
     corner: x, y of the pixels' top left corner in the whole picture [pixels].
     whole: width, height of the picture that the pixels were cropped from [pixels]; None where they are all of it.
     """
@@ -29,6 +30,7 @@ class PictureContents:
     premultiplied: bool
     channels: Sequence[str] | None = None
     attributes: Mapping[str, str] = field(default_factory=dict)
+    matrices: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     corner: tuple[int, int] = (0, 0)
     whole: tuple[int, int] | None = None
 

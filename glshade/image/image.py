@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.calibration.calibration import CAMERA, Calibration
 from glshade.errors import GlshadeError
 from glshade.image.contents import PictureContents
 from glshade.image.file import format_of, write
@@ -29,6 +30,7 @@ class Image:
     attributes: texts about the picture, by name, for files of formats that hold any.
     corner: x, y of a crop's top left corner in the whole picture [pixels].
     whole: width, height of the picture that a crop belongs to [pixels]; None where the picture is not cropped.
+    calibration: how the picture was seen; None where that is not known.
     """
 
     pixels: NDArray[Any]
@@ -36,6 +38,7 @@ class Image:
     attributes: dict[str, str] = field(default_factory=dict)
     corner: tuple[int, int] = (0, 0)
     whole: tuple[int, int] | None = None
+    calibration: Calibration | None = None
 
     @property
     def channels(self) -> str:
@@ -124,6 +127,18 @@ class Image:
             format_of(path).write(path, self._contents(False, {}))
             return path.read_bytes()
 
+    @property
+    def texts_of_camera(self) -> dict[str, str]:
+        """The attribute that tells how the picture was seen, as JSON; empty where that is not known."""
+        return {} if self.calibration is None else {CAMERA: self.calibration.json()}
+
+    @property
+    def matrices(self) -> dict[str, NDArray[np.float64]]:
+        """The matrices (4, 4) that OpenEXR defines for the camera, for row vectors; empty where it is not known."""
+        if self.calibration is None:
+            return {}
+        return self.calibration.exr_matrices(self.corner, self.whole or self.calibration.size)
+
     def _contents(self, floats: bool, attributes: Mapping[str, str]) -> PictureContents:
         """Returns the contents of a picture file. floats: whether it holds float32 numbers. attributes: further texts."""
         image = self.linear() if floats else self.encoded()
@@ -131,7 +146,8 @@ class Image:
             image.pixels,
             encoding="linear" if floats else image.encoding,
             premultiplied=floats,
-            attributes={**image.attributes, **attributes},
+            attributes={**image.attributes, **image.texts_of_camera, **attributes},
+            matrices=image.matrices,
             corner=image.corner,
             whole=image.whole,
         )

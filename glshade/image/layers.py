@@ -97,7 +97,8 @@ class Layers:
             encoding="linear",
             premultiplied=True,
             channels=channels,
-            attributes={**picture.attributes, **self.attributes},
+            attributes={**picture.attributes, **picture.texts_of_camera, **self.attributes},
+            matrices=picture.matrices,
             corner=picture.corner,
             whole=picture.whole,
         )

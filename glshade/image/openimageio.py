@@ -19,16 +19,21 @@ from glshade.image.contents import Part, PictureContents
 
 # Linux's folder with a path for each open file of this process, through which libraries can write to a file in memory.
 OPEN_FILES = "/proc/self/fd"
+# OpenEXR's names of the camera's matrices -> OpenImageIO's.
+MATRICES = {"worldToCamera": "worldtocamera", "worldToNDC": "worldtoNDC"}
 # An encoded picture is copied from memory to its file in pieces of this size [bytes].
 COPIED = 1 << 20
 
 
-def write(path: Path, contents: PictureContents, settings: Mapping[str, str | int], window: bool) -> None:
+def write(
+    path: Path, contents: PictureContents, settings: Mapping[str, str | int], window: bool, matrices: bool = False
+) -> None:
     """Writes a picture file in the format that the suffix of `path` names.
 
     On Linux with /proc the file is encoded in memory: if the disk were full, the JPEG library would end the process.
     settings: OpenImageIO's attributes of the file, by name, in the order in which they are set.
     window: True to store the place of a crop and the size of the whole picture.
+    matrices: True to store the camera's matrices.
     Errors: OSError, with the reason as its text.
     """
     spec = _spec(contents)
@@ -37,6 +42,9 @@ def write(path: Path, contents: PictureContents, settings: Mapping[str, str | in
         spec.full_width, spec.full_height = contents.whole or (spec.width, spec.height)
     for name, value in settings.items():
         spec.attribute(name, value)
+    if matrices:
+        for name, matrix in contents.matrices.items():
+            spec.attribute(MATRICES[name], "matrix", np.asarray(matrix, dtype=np.float32).reshape(-1))
     output = oiio.ImageOutput.create(str(path))
     if output is None:
         raise OSError(_error(oiio))

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from glshade.assembly.assembly import Assembly
 from glshade.assembly.instance import Instance
 from glshade.assembly.part import Part
+from glshade.calibration.calibration import Calibration
 from glshade.glsl.plan import ProgramPlan
 from glshade.glsl.planner import plan_instance
 from glshade.radiance.draw import Draw, placed, wide
@@ -42,6 +43,7 @@ class Inputs:
     clip_from_world: the matrix (4, 4) from positions relative to the eye to clip space, before it is rounded.
     extent: half the side of the square round a pixel's centre in which the pixel has its samples [pixels]. It is 0 for one
         sample a pixel, which lies at the centre; of several samples, only the driver knows the places.
+    calibration: how the picture is seen.
     """
 
     size: tuple[int, int]
@@ -49,7 +51,8 @@ class Inputs:
     draws: tuple[Draw, ...]
     window: tuple[int, int, int, int]
     clip_from_world: Array
-    extent: float = 0.0
+    extent: float
+    calibration: Calibration
 
     @cached_property
     def wanted(self) -> Indices:
@@ -80,7 +83,9 @@ def prepare(scene: Scene, shading: Rate | None = None, part: Part | None = None)
     clip = wide(window(whole, (width, height), 0, 0, width, height))
     samplers: dict[Texels, Sampler] = {}
     draws = (placed(scene, assembly, instance, clip, samplers) for instance in _in_order(assembly))
-    return Inputs((width, height), background, tuple(draws), scene.film.window, whole, 0.5 if scene.film.samples > 1 else 0.0)
+    extent = 0.5 if scene.film.samples > 1 else 0.0
+    calibration = assembly.calibration(scene)
+    return Inputs((width, height), background, tuple(draws), scene.film.window, whole, extent, calibration)
 
 
 def _in_order(assembly: Assembly) -> Iterator[Instance]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from glshade.arrays import group_starts
 from glshade.assembly.part import Part
 from glshade.image.image import Image
-from glshade.reference.inputs import prepare
+from glshade.reference.inputs import Inputs, prepare
 from glshade.reference.raster import rasterise, resolve
 from glshade.reference.shade import AT_CENTRE, Sampling, is_there, shade_fragments
 from glshade.scene.object import Rate
@@ -26,8 +26,10 @@ def render(scene: Scene, *, shading: Rate | None = None) -> Image:
     Errors: SceneError.
     """
     film = scene.film
-    picture = radiance(scene, shading=shading)[..., : len(film.background)].astype(np.float32)
-    return Image(picture, "linear", corner=film.window[:2], whole=film.size if film.crop else None)
+    inputs = prepare(scene, shading)
+    picture = _shown(inputs, AT_CENTRE)[..., : len(film.background)].astype(np.float32)
+    whole = film.size if film.crop else None
+    return Image(picture, "linear", corner=film.window[:2], whole=whole, calibration=inputs.calibration)
 
 
 def radiance(
@@ -47,7 +49,11 @@ def radiance(
     offset: the distance (right, down) by which all pixels are shifted, for the mean of several pictures [pixels].
     Errors: SceneError.
     """
-    inputs = prepare(part.scene(scene) if part else scene, shading, part).shifted(*offset)
+    return _shown(prepare(part.scene(scene) if part else scene, shading, part).shifted(*offset), sampling)
+
+
+def _shown(inputs: Inputs, sampling: Sampling) -> NDArray[Any]:
+    """Returns the pixels (H, W, 4), as `radiance` does."""
     nearest, layers = resolve(inputs, rasterise(inputs), lambda fragments: is_there(inputs, fragments, sampling))
     width, height = inputs.size
     picture: NDArray[Any] = np.broadcast_to(inputs.background, (width * height, 4)).astype(sampling.dtype)

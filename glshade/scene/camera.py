@@ -2,13 +2,15 @@
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, Field
 
+from glshade.calibration.calibration import Calibration, Kind
+from glshade.calibration.rotation import FLIPPED, nearest_rotation, rigid
 from glshade.document import Direction, Document, Finite, Vector3, fault
 from glshade.errors import figure
 
@@ -34,6 +36,15 @@ def affine(matrix: Matrix4) -> Matrix4:
     return matrix
 
 
+def _pose(matrix: Matrix4) -> Matrix4:
+    """Returns the matrix of a camera; refuses one that is not affine, that flattens space, or that mirrors it."""
+    try:
+        nearest_rotation(np.array(affine(matrix))[:3, :3])
+    except ValueError as error:
+        raise fault(f"is no pose of a camera: {error}") from None
+    return matrix
+
+
 def is_singular(linear: Array) -> bool:
     """Returns whether a matrix (3, 3) flattens space, whatever its scale: its columns, made unit, span a volume below 1e-9."""
     length = np.linalg.norm(linear, axis=0)
@@ -51,6 +62,8 @@ class View:
     half_height: half the height that the picture spans, likewise [scene units].
     near: depth of the near plane [scene units].
     far: depth of the far plane [scene units].
+    centre: x, y of the point where the camera's axis meets the picture. They go from -1 to 1 across the picture, x to the right
+        and y up.
     """
 
     perspective: bool
@@ -60,6 +73,7 @@ class View:
     half_height: float
     near: float
     far: float
+    centre: tuple[float, float] = (0.0, 0.0)
 
     @property
     def toward_viewer(self) -> Array:
@@ -93,9 +107,52 @@ class View:
             projection[3, 3] = 1
         if not zero_to_one:
             projection[2] = 2 * projection[2] - projection[3]
+        if any(self.centre):
+            projection[0] += self.centre[0] * projection[3]
+            projection[1] -= self.centre[1] * projection[3]
         turn = np.eye(4)
         turn[:3, :3] = self.axes
         return projection @ turn
+
+
+def calibration_of(view: View, size: tuple[int, int], objects: Mapping[str, Array]) -> Calibration:
+    """Returns the calibration of a picture.
+
+    view: the camera at its final position.
+    size: width and height of the whole picture [pixels].
+    objects: name of an object -> transform (4, 4) from its space to world space [scene units].
+    """
+    width, height = size
+    pose = np.eye(4)
+    pose[:3, :3] = view.axes.T
+    pose[:3, 3] = view.eye
+    return Calibration(
+        kind="perspective" if view.perspective else "orthographic",
+        size=size,
+        fx=width / (2 * view.half_width),
+        fy=height / (2 * view.half_height),
+        cx=width / 2 * (1 + view.centre[0]),
+        cy=height / 2 * (1 - view.centre[1]),
+        world_from_camera=pose,
+        near=view.near,
+        far=view.far,
+        objects=objects,
+    )
+
+
+def intrinsics(calibration: Calibration) -> dict[str, Any]:
+    """Returns the table of the calibrated camera that sees as a calibration says."""
+    width, height = calibration.size
+    planes = {"near": calibration.near, "far": calibration.far} if calibration.far > calibration.near else {}
+    return {
+        "type": "intrinsics",
+        "projection": calibration.kind,
+        **{key: getattr(calibration, key) for key in ("fx", "fy", "cx", "cy")},
+        "width": width,
+        "height": height,
+        "matrix": calibration.world_from_camera.tolist(),
+        **planes,
+    }
 
 
 def window(clip: Array, size: tuple[int, int], x: float, y: float, width: int, height: int) -> Array:
@@ -121,8 +178,12 @@ class Camera(Document):
     eye: Vector3 | None = Field(None, description="position of the viewer; left out: a position that shows the whole scene")
     target: Vector3 | None = Field(None, description="point in the middle of the picture; left out: the middle of the scene")
     up: Direction = Field((0.0, 1.0, 0.0), description="direction that points up in the picture")
-    matrix: Annotated[Matrix4, AfterValidator(affine)] | None = Field(
-        None, description="world from camera, in place of eye, target and up: x right, y up, looking along -z"
+    matrix: Annotated[Matrix4, AfterValidator(_pose)] | None = Field(
+        None, description="world from camera, in place of eye, target and up; numbers of few digits become the nearest rotation"
+    )
+    convention: Literal["opengl", "opencv"] = Field(
+        "opengl",
+        description="axes of matrix; opengl: x right, y up, looking along -z; opencv: x right, y down, looking along z",
     )
     fit: bool = Field(False, description="keeps the direction of view, and moves the eye until it sees the whole scene")
     turn: Finite = Field(0.0, description="turns the camera round the target or the scene's middle, about up [degrees]")
@@ -142,7 +203,12 @@ class Camera(Document):
         if isinstance(near, number) and isinstance(far, number) and near >= far:
             yield ("near",), f"{figure(near)} must be less than far, {figure(far)}"
         for key, depth in (("near", near), ("far", far)):
-            if isinstance(depth, number) and depth <= 0 and data.get("type", "perspective") == "perspective":
+            if (
+                isinstance(depth, number)
+                and depth <= 0
+                and data.get("type", "perspective") != "orthographic"
+                and (data.get("projection", "perspective") == "perspective")
+            ):
                 yield (key,), f"must be greater than 0 in a perspective view, not {figure(depth)}"
         eye, target = data.get("eye"), data.get("target")
         if eye is not None and target is not None and list(eye) == list(target):
@@ -154,7 +220,7 @@ class Camera(Document):
         middle: the middle of the scene (3,), which is the target if the key `target` is left out [scene units].
         """
         if self.matrix is not None:
-            backward, up = np.array(self.matrix)[:3, 2], np.array(self.matrix)[:3, 1]
+            _, up, backward = self._rotation.T
         else:
             target = middle if self.target is None else np.array(self.target)
             backward = np.array(THREE_QUARTERS) if self.eye is None else np.array(self.eye) - target
@@ -169,6 +235,13 @@ class Camera(Document):
         right = right / np.linalg.norm(right)
         axes: Array = np.stack([right, np.cross(backward, right), backward]) @ self._turned.T
         return axes
+
+    @property
+    def _rotation(self) -> Array:
+        """The rotation (3, 3) of the matrix, with OpenGL's axes as columns. Warns where the matrix is not close to one."""
+        linear = rigid(np.array(self.matrix)[:3, :3], self.name or "camera")
+        turned: Array = linear if self.convention == "opengl" else linear @ FLIPPED[:3, :3]
+        return turned
 
     @property
     def _turned(self) -> Array:
@@ -231,6 +304,27 @@ class Camera(Document):
         raise NotImplementedError
 
 
+def _place(points: Array, halves: tuple[float, float], centre: tuple[float, float] = (0.0, 0.0)) -> Array:
+    """Returns the nearest place (3,) of a pinhole camera that sees all points (N, 3).
+
+    halves, centre: half the width and half the height at depth 1, and the place of the axis, as in View.
+    """
+    # An eye at (x, y, z) sees a point (a, b, c) inside the picture's right edge if a - x <= right (z - c). The other edges
+    # give similar inequalities. Each pair of opposite edges gives a least z, and then a range of the eye's other coordinate.
+    eye = np.zeros(3)
+    ranges = []
+    for axis, (half, c) in enumerate(zip(halves, centre, strict=True)):
+        right, left = half / MARGIN - c * half, half / MARGIN + c * half
+        over = float((points[:, axis] + right * points[:, 2]).max())
+        under = float((left * points[:, 2] - points[:, axis]).max())
+        ranges.append((over - under, left - right))
+        eye[2] = max(eye[2], (over + under) / (right + left))
+    # The eye must not lie inside a scene that is a single point or almost one.
+    eye[2] = max(eye[2], float(points[:, 2].max()) + 1e-3 * float(np.ptp(points, axis=0).max()), 1e-30)
+    eye[:2] = [0.5 * (middle + slope * eye[2]) for middle, slope in ranges]
+    return eye
+
+
 class Perspective(Camera):
     """A pinhole camera."""
 
@@ -242,16 +336,7 @@ class Perspective(Camera):
         return half_height * aspect, half_height
 
     def frame(self, points: Array, half_width: float, half_height: float, aspect: float) -> tuple[Array, float, float]:
-        # An eye at (x, y, z) sees a point (a, b, c) inside the picture's right edge if a - x <= half_width (z - c). The other
-        # three edges give similar inequalities. Each pair of opposite edges gives one coordinate of the eye and a least z.
-        eye = np.zeros(3)
-        for axis, half in enumerate((half_width / MARGIN, half_height / MARGIN)):
-            over, under = (float((sign * points[:, axis] + half * points[:, 2]).max()) for sign in (1, -1))
-            eye[axis] = 0.5 * (over - under)
-            eye[2] = max(eye[2], 0.5 * (over + under) / half)
-        # The eye must not lie inside a scene that is a single point or almost one.
-        eye[2] = max(eye[2], float(points[:, 2].max()) + 1e-3 * float(np.ptp(points, axis=0).max()), 1e-30)
-        return eye, half_width, half_height
+        return _place(points, (half_width, half_height)), half_width, half_height
 
     def depth_range(self, depth: Array) -> tuple[float, float]:
         deepest = float(depth.max())
@@ -301,4 +386,50 @@ class Orthographic(Camera):
         return (near, far) if near < far else (near, near + 1.0) if self.far is None else (far - 1.0, far)
 
 
-CAMERAS: dict[str, type[Document]] = {"perspective": Perspective, "orthographic": Orthographic}
+class Intrinsics(Camera):
+    """A calibrated camera: its pixels need not be square, and its axis need not meet the middle of the picture.
+
+    The numbers are those of the camera matrix of computer vision (Hartley and Zisserman 2004, equation 6.10, without skew).
+    """
+
+    type: Literal["intrinsics"] = "intrinsics"
+    projection: Kind = Field("perspective", description="orthographic: fx and fy are pixels for each scene unit")
+    fx: Annotated[Finite, Field(gt=0)] = Field(description="focal length along x [pixels]")
+    fy: Annotated[Finite, Field(gt=0)] = Field(description="focal length along y [pixels]")
+    cx: Finite = Field(description="where the axis meets the picture, from its left edge [pixels]")
+    cy: Finite = Field(description="where the axis meets the picture, from its upper edge [pixels]")
+    width: Annotated[int, Field(ge=1)] = Field(
+        description="width that these numbers belong to; also film.size's default [pixels]"
+    )
+    height: Annotated[int, Field(ge=1)] = Field(description="height that they belong to; also film.size's default [pixels]")
+
+    @property
+    def centre(self) -> tuple[float, float]:
+        """Where the axis meets the picture, as in View."""
+        return 2 * self.cx / self.width - 1, 1 - 2 * self.cy / self.height
+
+    @property
+    def _model(self) -> "Perspective | Orthographic":
+        """The centred camera that chooses its planes as this one does."""
+        return (Perspective if self.projection == "perspective" else Orthographic)(near=self.near, far=self.far)
+
+    def view(self, points: Array, aspect: float) -> View:
+        view = super().view(points, aspect)
+        return replace(view, perspective=self.projection == "perspective", centre=self.centre)
+
+    def half_size(self, aspect: float) -> tuple[float, float]:
+        return self.width / (2 * self.fx), self.height / (2 * self.fy)
+
+    def frame(self, points: Array, half_width: float, half_height: float, aspect: float) -> tuple[Array, float, float]:
+        if self.projection == "perspective":
+            return _place(points, (half_width, half_height), self.centre), half_width, half_height
+        eye, _, _ = self._model.frame(points, half_width, half_height, aspect)
+        # The middle of the scene appears in the middle of the picture.
+        eye[:2] += np.array(self.centre) * (half_width, half_height)
+        return eye, half_width, half_height
+
+    def depth_range(self, depth: Array) -> tuple[float, float]:
+        return self._model.depth_range(depth)
+
+
+CAMERAS: dict[str, type[Document]] = {"perspective": Perspective, "orthographic": Orthographic, "intrinsics": Intrinsics}

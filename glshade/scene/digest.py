@@ -33,7 +33,8 @@ def scene_digest(scene: Scene) -> str:
         if isinstance(value, Mesh):
             return value.digest
         if isinstance(value, Document):
-            return {key: content(getattr(value, key)) for key in type(value).model_fields}
+            # The cameras of the file `cameras_from` are among the scene's cameras.
+            return {key: content(getattr(value, key)) for key in type(value).model_fields if key != "cameras_from"}
         if isinstance(value, dict):
             return {key: content(item) for key, item in value.items()}
         if isinstance(value, tuple | list):

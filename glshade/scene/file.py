@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import tomllib
 import warnings
@@ -88,8 +89,10 @@ class SceneFile:
             known = ", ".join([*TEXT_SUFFIXES, *sorted(mesh_file.SUFFIXES)])
             raise SceneError(f"{self.path}: {suffix or 'no extension'} is neither a scene nor a mesh; known: {known}")
         document, overrides = of_files.chosen(document, overrides)
-        self.document = _overridden(document, overrides, self.path)
+        values = _values(overrides, self.path)
+        self.document = _overridden(document, values, self.path)
         self._as_written = self.document is document
+        self._of_camera = [(key, value) for key, value in values if key.startswith("camera.")]
         # The texture files that are known to be readable.
         self._probed: set[Path] = set()
         # The last scene whose files were all readable.
@@ -143,23 +146,55 @@ class SceneFile:
     def _at(self, frame: float) -> Scene:
         """Returns the scene at a frame. Values that no track changes are not validated again and stay the same objects."""
         written = self._written
-        if not written.animation:
+        if not written.animation and written.sample is None:
             return written
+        return parse(merged(written, self.document, self.document_at(frame)), self.path, self.limits)
+
+    def document_at(self, frame: float) -> dict[str, Any]:
+        """Returns the table of the scene at a frame: its sample is drawn, and its animation is applied.
+
+        Errors: SceneError for a key that names no value.
+        """
         from glshade.scene.animation import at_frame
         from glshade.scene.override import OverrideError
+        from glshade.scene.sampling import at_sample
 
+        written, part, document = self._written, "sample", dict(self.document)
         try:
-            document = at_frame(self.document, written.animation, frame)
+            if written.sample is not None:
+                document = at_sample(document, written.sample, math.floor(frame))
+            part = "animation"
+            return at_frame(document, written.animation, frame)
         except OverrideError as error:
-            raise SceneError(f"{self.path}: animation: {error}") from None
-        return parse(merged(written, self.document, document), self.path, self.limits)
+            raise SceneError(f"{self.path}: {part}: {error}") from None
+
+    def drawn(self, frame: float | None) -> dict[str, Any]:
+        """Returns the values of the sample that is drawn at a frame, by their dotted keys; empty without a sample."""
+        sample = self._written.sample
+        return {} if sample is None or frame is None else sample.drawn(math.floor(frame))
 
     def _through(self, camera: str, scene: Scene) -> Scene:
         """Returns the scene with one of its further cameras; the same object for the same scene."""
         if camera not in self._seen or self._seen[camera][0] is not scene:
             view = scene.cameras.get(camera) or of_files.file_cameras(scene, scene.loader())[camera]
-            self._seen[camera] = scene, scene.model_copy(update={"camera": view})
+            self._seen[camera] = scene, self._overridden_camera(scene.through(view))
         return self._seen[camera][1]
+
+    def _overridden_camera(self, scene: Scene) -> Scene:
+        """Returns the scene with the overrides of `camera.*` in the camera through which it is seen, whatever its name.
+
+        Errors: SceneError.
+        """
+        if not self._of_camera:
+            return scene
+        from glshade.scene.override import apply
+
+        document: Mapping[str, Any] = {"camera": scene.camera.model_dump(exclude_unset=True)}
+        for key, value in self._of_camera:
+            document = apply(document, key, value)
+        # The other values are validated already, and so are the cameras of another file.
+        known = {key: getattr(scene, key) for key in Scene.model_fields if key != "cameras_from"}
+        return parse({**known, **document}, self.path, self.limits)
 
     def _check(self, scene: Scene) -> None:
         """Reads the mesh files that the scene names, and the headers of texture files that are new. Errors: SceneError."""
@@ -215,20 +250,28 @@ def merged(written: Scene, before: Mapping[str, Any], after: Mapping[str, Any]) 
     return merged
 
 
-def _overridden(document: Any, overrides: Overrides, path: Path) -> Any:
-    """Returns the document with its overrides; the same object where there are none.
+def _values(overrides: Overrides, path: Path) -> list[tuple[str, Any]]:
+    """Returns the keys and values of overrides. Errors: SceneError for a text that is not a value."""
+    if not overrides:
+        return []
+    from glshade.scene.override import pairs
+
+    try:
+        return pairs(overrides)
+    except ValueError as error:
+        raise SceneError(f"{path}: --set {error}") from None
+
+
+def _overridden(document: Any, values: Sequence[tuple[str, Any]], path: Path) -> Any:
+    """Returns the document with values in place of its own; the same object where there are none.
 
     Errors: SceneError for every key that names no value.
     """
     # A document that is not a table is reported later, as a fault of the file.
-    if not overrides or not isinstance(document, Mapping):
+    if not values or not isinstance(document, Mapping):
         return document
-    from glshade.scene.override import OverrideError, apply, pairs
+    from glshade.scene.override import OverrideError, apply
 
-    try:
-        values = pairs(overrides)
-    except ValueError as error:
-        raise SceneError(f"{path}: --set {error}") from None
     problems = []
     for key, value in values:
         try:

@@ -7,19 +7,21 @@ from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, PrivateAttr, model_validator
+from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
-from glshade.document import Chosen, Document, nearest, value_of
+from glshade.document import Chosen, Document, FileOrFolder, fault, nearest, resolved, value_of
+from glshade.errors import AssetError
 from glshade.lights import LIGHTS, Light
 from glshade.limits import LONGEST_CHAIN, UNLIMITED, Limits
 from glshade.mesh import file as mesh_file
 from glshade.mesh.model import Model
 from glshade.presets import PRESETS, preset
 from glshade.scene.animation import Track
-from glshade.scene.camera import CAMERAS, Camera, Perspective
+from glshade.scene.camera import CAMERAS, Camera, Intrinsics, Perspective, intrinsics
 from glshade.scene.film import Film
 from glshade.scene.object import Material, Object
 from glshade.scene.quality import Quality
+from glshade.scene.sampling import Sample
 from glshade.textures.texture import Picture
 
 Array = NDArray[np.float64]
@@ -29,6 +31,14 @@ def _items(data: Any, key: str) -> list[Any]:
     """Returns the list under a key; empty where there is none."""
     value = value_of(data, key)
     return list(value) if isinstance(value, list | tuple) else []
+
+
+def _sized(film: Film, camera: Camera) -> Film:
+    """Returns the film with the size of a calibrated camera; the same film where it has a size of its own."""
+    if not isinstance(camera, Intrinsics) or "size" in film.model_fields_set:
+        return film
+    # The key does not count as set, so that another camera may bring another size.
+    return Film.model_construct(film.model_fields_set, **{**dict(film), "size": (camera.width, camera.height)})
 
 
 class Scene(Document):
@@ -48,7 +58,12 @@ class Scene(Document):
     cameras: dict[str, Annotated[Camera, Chosen(CAMERAS, "type", default="perspective")]] = Field(
         {}, description="name -> camera: more cameras, which `glshade render --camera` chooses by name"
     )
+    cameras_from: FileOrFolder | None = Field(
+        None,
+        description="file or folder with more cameras, as --cameras writes it; they are named after their pictures",
+    )
     animation: tuple[Track, ...] = Field((), description="values that change from frame to frame")
+    sample: Sample | None = Field(None, description="values that are drawn at random: frame n is sample n")
 
     # The limits under which the scene's file was read; a scene that was built in Python has none.
     _limits: Limits = PrivateAttr(UNLIMITED)
@@ -58,6 +73,15 @@ class Scene(Document):
     def model_post_init(self, context: Any) -> None:
         """Stores the limits that the validation context holds under the key "limits"."""
         self._limits = (context or {}).get("limits", UNLIMITED)
+
+    @model_validator(mode="after")
+    def _with_size(self) -> "Scene":
+        """Gives the film the size of a calibrated camera, unless the film has one."""
+        film = _sized(self.film, self.camera)
+        if film is not self.film:
+            # The scene is frozen for everyone else.
+            self.__dict__["film"] = film
+        return self
 
     def __eq__(self, other: object) -> bool:
         """Compares the values of two scenes, whatever their limits."""
@@ -72,6 +96,13 @@ class Scene(Document):
     def models(self) -> Mapping[Path, Model] | None:
         """The contents of the scene's mesh files, by their paths; None where they are read when the scene is drawn."""
         return self._models
+
+    def through(self, camera: Camera) -> "Scene":
+        """Returns the scene through another camera.
+
+        A calibrated camera brings its own size of the picture, unless the scene's film has one.
+        """
+        return self.model_copy(update={"camera": camera, "film": _sized(self.film, camera)})
 
     def quality_of(self, item: Object) -> Quality:
         """Returns the quality with which an object is drawn: its own, over the scene's."""
@@ -127,6 +158,22 @@ class Scene(Document):
         named = [value_of(item, "material") for item in _items(data, "objects")]
         used = {name: preset(name) for name in named if isinstance(name, str) and name in PRESETS and name not in own}
         return {**data, "materials": {**own, **used}} if used else data
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_cameras(cls, data: Any, info: ValidationInfo) -> Any:
+        """Adds the cameras of the file that the scene names. A camera of the scene's own keeps its name."""
+        path = data.get("cameras_from") if isinstance(data, Mapping) else None
+        own = data.get("cameras", {}) if isinstance(data, Mapping) else None
+        if not isinstance(path, str | Path) or not isinstance(own, Mapping):
+            return data
+        from glshade.calibration.file import named
+
+        try:
+            found = named(resolved(Path(path), info, folders=True))
+        except AssetError as error:
+            raise fault("; ".join(error.problems)) from None
+        return {**data, "cameras": {**{name: intrinsics(camera) for name, camera in found.items()}, **own}}
 
     @classmethod
     def cross_faults(cls, data: Any) -> Iterator[tuple[tuple[str | int, ...], str]]:

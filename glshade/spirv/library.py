@@ -105,8 +105,8 @@ def _cross(arithmetic: Arithmetic, line: int, a: Array, b: Array) -> Array:
 def _mix(arithmetic: Arithmetic, line: int, x: Array, y: Array, a: Array) -> Array:
     """Returns x (1 - a) + y a, the form of the specification.
 
-    Many drivers compute x + a (y - x). Rounding the difference and the product adds an error relative to a (y - x), which may be
-    much larger than the result.
+    Many drivers compute x + a (y - x). Rounding the difference and the product adds an error relative to a (y - x), which may
+    be much larger than the result.
     """
     first = arithmetic.rounded(x * arithmetic.rounded(1 - a, line), line)
     result = first + arithmetic.rounded(y * a, line)

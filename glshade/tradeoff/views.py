@@ -50,8 +50,10 @@ def views_around(scene: Scene, count: int, start: float = 0.0, largest: int = LA
         angle = start + k * GOLDEN
         z = own_height if k % 2 else 1 - 2 * ((k // 2 + start / math.pi) % (count / 2)) / (count / 2)
         direction = _around(backward, up, angle, z)
-        half = {"fov": camera.fov} if isinstance(camera, Perspective) else {"height": 2 * view.half_height}
         kind = Perspective if view.perspective else Orthographic
+        half = {"height": 2 * view.half_height}
+        if view.perspective:
+            half = {"fov": camera.fov if isinstance(camera, Perspective) else math.degrees(2 * math.atan(view.half_height))}
         moved = kind.model_validate({"eye": target + distance * direction, "target": target, "up": tuple(up), **half})
         views.append(scene.model_copy(update={"camera": moved}))
     return views

@@ -17,8 +17,8 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PACKAGE = ROOT / "glshade"
 # A room imports from the rooms before it.
 ROOMS = (
-    *("optics", "image", "page", "lights", "presets", "textures", "mesh", "brdfs", "scene", "assembly", "radiance"),
-    *("glsl", "spirv", "gl", "reference", "debug", "driver", "verification", "catalogue", "pyrender", "tradeoff"),
+    *("optics", "calibration", "image", "page", "lights", "presets", "textures", "mesh", "brdfs", "scene", "assembly"),
+    *("radiance", "glsl", "spirv", "gl", "reference", "debug", "driver", "verification", "catalogue", "pyrender", "tradeoff"),
     *("golden", "live", "batch", "bench", "cli"),
 )
 # Modules of no room, which every room may import. They import no room.
@@ -154,7 +154,7 @@ def test_help_loads_no_room_but_the_command_line(python: Any) -> None:
     code = "import sys; sys.argv = ['glshade', '--help']; from glshade.cli import cli; cli.main(standalone_mode=False)"
     found = loaded(python, f"{code}; print()")
     rooms = {room(name) for name in found if name.startswith("glshade.")}
-    assert rooms & set(ROOMS) <= {"cli", "image", "mesh"}, "of image and mesh, the suffixes of their formats"
+    assert rooms & set(ROOMS) <= {"cli", "calibration", "image", "mesh"}, "of the last three, the names of their formats"
     assert not found & (HEAVY - {"click", "rich"})
 
 

@@ -33,6 +33,7 @@ class PictureFormat:
     alpha: True where files hold alpha; False where only the colours are written.
     layers: True where one file holds a picture and its named layers; False where the layers need a file of their own.
     window: True where a file of a cropped picture holds the crop's place and the size of the whole picture.
+    matrices: True where a file holds the camera's matrices.
     metadata: the place of texts about the picture: "attributes" with names of their own, "description" for one JSON object in
         the file's description, or "nowhere".
     description_size: the longest description that files hold [bytes]; None where any length will do.
@@ -43,6 +44,7 @@ class PictureFormat:
     alpha: ClassVar[bool] = True
     layers: ClassVar[bool] = False
     window: ClassVar[bool] = False
+    matrices: ClassVar[bool] = False
     metadata: ClassVar[Metadata] = "description"
     description_size: ClassVar[int | None] = None
     settings: ClassVar[Settings] = {}
@@ -52,7 +54,7 @@ class PictureFormat:
         from glshade.image import openimageio
 
         settings = {"Software": "glshade", **self.settings, **self._stored(contents.attributes)}
-        openimageio.write(path, contents, settings, self.window)
+        openimageio.write(path, contents, settings, self.window, self.matrices)
 
     def read(self, path: Path) -> PictureContents:
         """Returns the pixels of a file: (H, W, C) float32 with C = 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA).

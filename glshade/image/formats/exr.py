@@ -11,5 +11,6 @@ class Exr(PictureFormat):
     floats = True
     layers = True
     window = True
+    matrices = True
     metadata = "attributes"
     settings: ClassVar[Settings] = {"Compression": "zip", "DateTime": FIXED_TIME}

@@ -14,7 +14,7 @@ from glshade.assembly.assembly import DEFAULT_MATERIAL, assemble
 from glshade.brdfs import BRDFS, Brdf
 from glshade.lights import Light
 from glshade.mesh.mesh import Mesh
-from glshade.scene.camera import Orthographic, Perspective, View
+from glshade.scene.camera import Camera, Intrinsics, Orthographic, Perspective, View, calibration_of, intrinsics
 from glshade.scene.object import Object, Transform
 from glshade.scene.scene import Scene
 from glshade.verification.laws._law import NotApplicableError
@@ -39,8 +39,9 @@ def written_out(scene: Scene) -> Scene:
     # An assembly of extreme size is in another unit of length. Its lights and its view would not fit the scene.
     if assembly.unit != 1:
         raise NotApplicableError("the scene is so small or large that it is drawn in another unit of length")
+    camera = camera_at(assembly.view, isinstance(scene.camera, Intrinsics))
     objects = tuple(item.model_copy(update={"file_lights": False}) if item.file_lights else item for item in scene.objects)
-    return scene.model_copy(update={"camera": camera_at(assembly.view), "lights": lights_of(scene), "objects": objects})
+    return scene.model_copy(update={"camera": camera, "lights": lights_of(scene), "objects": objects})
 
 
 def lights_of(scene: Scene) -> tuple[Light, ...]:
@@ -51,11 +52,18 @@ def lights_of(scene: Scene) -> tuple[Light, ...]:
     return assembly.lights[: assembly.own_light]
 
 
-def camera_at(view: View) -> Perspective | Orthographic:
-    """Returns the camera that has this view in a picture of the same aspect."""
+def camera_at(view: View, calibrated: bool = False) -> Camera:
+    """Returns the camera that has this view in a picture of the same aspect.
+
+    calibrated: whether the view need not be centred, nor its pixels be square.
+    """
     matrix = np.eye(4)
     matrix[:3, :3], matrix[:3, 3] = view.axes.T, view.eye
     place = {"matrix": rows(matrix), "near": view.near, "far": view.far}
+    if calibrated:
+        # The numbers are those of a picture of one pixel.
+        seen = calibration_of(view, (1, 1), {})
+        return Intrinsics.model_validate(intrinsics(seen))
     if view.perspective:
         return Perspective.model_validate({**place, "fov": 2 * math.degrees(math.atan(view.half_height))})
     return Orthographic.model_validate({**place, "height": 2 * view.half_height})
@@ -101,7 +109,15 @@ def _moved_camera(camera: Any, move: Array, scale: float) -> Any:
     matrix = np.array(camera.matrix)
     matrix[:3, :3] = move[:3, :3] @ matrix[:3, :3] / scale
     matrix[:3, 3] = move[:3, :3] @ matrix[:3, 3] + move[:3, 3]
-    changes: dict[str, Any] = {"matrix": rows(matrix), "near": camera.near * scale, "far": camera.far * scale}
+    changes: dict[str, Any] = {"near": camera.near * scale, "far": camera.far * scale}
+    if np.linalg.det(move[:3, :3]) < 0:
+        # A camera cannot be mirrored; its picture is. So its x axis stays on the same side, and its picture's middle does not.
+        matrix[:3, 0] *= -1
+        if isinstance(camera, Intrinsics):
+            changes["cx"] = camera.width - camera.cx
+    changes["matrix"] = rows(matrix)
+    if isinstance(camera, Intrinsics) and camera.projection == "orthographic":
+        changes |= {"fx": camera.fx / scale, "fy": camera.fy / scale}
     if isinstance(camera, Orthographic):
         assert camera.height is not None
         changes["height"] = camera.height * scale

@@ -38,7 +38,7 @@ def fault(**keys: Any) -> tuple[str, str]:
         (
             {"colour": 3},
             "colour",
-            "unknown key; allowed: animation, camera, cameras, description, film, lights, materials, objects, quality",
+            "unknown key; allowed: animation, camera, cameras, cameras_from, description, film, lights, materials, objects",
         ),
         ({"light": []}, "light", 'unknown key; did you mean "lights"?'),
         ({"film": {"sizes": [1, 1]}}, "film.sizes", 'unknown key; did you mean "size"?'),

@@ -205,9 +205,9 @@ def objects_reordered(patch: pytest.MonkeyPatch) -> None:
     original = assembly._pieces
 
     def pieces(*arguments: Any) -> Any:
-        found = original(*arguments)
+        found, objects = original(*arguments)
         first = {piece.material.brdf: piece.material for piece in reversed(found)}
-        return [replace(piece, material=first[piece.material.brdf]) for piece in found]
+        return [replace(piece, material=first[piece.material.brdf]) for piece in found], objects
 
     patch.setattr(assembly, "_pieces", pieces)
 
