@@ -13,7 +13,7 @@ from dataclasses import dataclass
 LARGEST_SCENE = 16 << 20
 # The largest file that ships with glshade has 8 kB.
 LARGEST_SHADER = 1 << 20
-# trimesh reads a mesh file as a whole into memory.
+# A mesh file is read as a whole into memory.
 LARGEST_MESH = 4 << 30
 
 # The nesting of lists and tables in a document. The deepest value of the format, a number of a matrix, lies at depth 6.

@@ -47,7 +47,9 @@ def plans() -> Iterator[ProgramPlan]:
             yield replace(one, normal_map=True, vertex_colours=True, alpha="mask", alpha_from=textured)
             yield replace(one, vertex_colours=True, alpha="blend", alpha_from=textured)
             yield replace(one, normal_map=True, normal_span=(2, 1))
-            if use == "texture":
+            if textured:
+                placed = (f"u_{textured}_texture", "u_normal_map", "u_direction_map")
+                yield replace(one, normal_map=True, direction_map=model.anisotropic, placed=placed, added=(textured,))
                 yield replace(one, shared=tuple((p, base.parameters[0][0]) for p, _ in base.parameters[1:]))
             if model.anisotropic:
                 for bumps, turned in itertools.product((False, True), repeat=2):

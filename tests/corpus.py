@@ -1,6 +1,6 @@
 """Renders every mesh file below a folder, prints a table with what became of each, and writes a contact sheet.
 
-    .venv/bin/python tests/corpus.py FOLDER [--verify] [--sheet SHEET.png] [--report REPORT.json]
+    .venv/bin/python tests/corpus.py FOLDER [--verify] [--f3d PYTHON] [--sheet SHEET.png] [--report REPORT.json]
 
 Each file is drawn in a child process, whose time and memory are bounded. The outcomes are:
 
@@ -10,6 +10,9 @@ Each file is drawn in a child process, whose time and memory are bounded. The ou
     wrong      the picture is empty or not finite; an error has no line of its own; the process hung or died; with --verify, the
                picture is not the one that the reference draws
 
+With --f3d, the sheet shows beside each picture the one that f3d draws (https://f3d.app, PyPI f3d, 251 MB). PYTHON is an
+interpreter that can import it; `--f3d` alone means this one.
+
 Where a folder has a Manifest.json of the glTF Asset Generator, the cameras of that file are used. They look at the origin with
 a vertical angle of 45.8 degrees, as the generator's own sample pictures do.
 """
@@ -18,6 +21,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import subprocess
 import sys
 import traceback
 import warnings
@@ -33,7 +37,7 @@ from typing import Any
 from support.child import Child, serve
 
 # The limits of one file: time [s], and memory of the process [bytes].
-SECONDS, MEMORY = 120, 6 << 30
+SECONDS, MEMORY = 120, 8 << 30
 # The size of a picture in the sheet [pixels], the pictures in a row, and the height of a label [pixels].
 SIZE, COLUMNS, LABEL = (200, 150), 8, 26
 # The most pictures of one sheet; more would make a picture that no program shows whole.
@@ -50,6 +54,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("--verify", action="store_true", help="verifies each picture too")
+    parser.add_argument(
+        "--f3d", nargs="?", const=sys.executable, metavar="PYTHON", help="shows f3d's pictures in the sheet, too"
+    )
     parser.add_argument("--sheet", type=Path, default=Path("corpus.png"), help="the contact sheet [default: corpus.png]")
     parser.add_argument("--report", type=Path, help="writes the table to this file as JSON")
     parser.add_argument("--files", nargs="*", default=[], help="renders only files whose paths contain one of these texts")
@@ -63,6 +70,9 @@ def main() -> int:
             print(f"{row['outcome']:8} {row['seconds']:6.1f} s  {row['file']}  {row['words'][:300]}", flush=True)
             rows.append(row)
         rows.sort(key=lambda row: row["file"])
+        if chosen.f3d:
+            for row in rows:
+                row["peer"] = f3d_picture(chosen.f3d, Path(row["path"]), Path(row["picture"]).with_suffix(".f3d.png"))
         for number, first in enumerate(range(0, len(rows), MOST)):
             name = chosen.sheet if number == 0 else chosen.sheet.with_stem(f"{chosen.sheet.stem}-{number + 1}")
             sheet(rows[first : first + MOST], name)
@@ -155,26 +165,53 @@ def outcome_of(question: dict[str, Any], renderer: Any) -> tuple[str, str]:
     if np.ptp(linear.reshape(-1, linear.shape[-1]), axis=0).max() == 0.0:
         return "wrong", "the picture is empty"
     if question["verify"]:
-        small = scene.film.model_copy(update={"size": (64, 48)})
+        # One sample a pixel: with several, most pixels of so small a picture are edges, which leaves the verdict open.
+        small = scene.film.model_copy(update={"size": (64, 48), "samples": 1})
         verdict = glshade.verify(scene.model_copy(update={"film": small}), renderer=renderer)
         if verdict.exit_code:
-            return "wrong" if verdict.exit_code == 6 else "drawn", f"verify: {verdict}"
+            return "wrong" if verdict.exit_code == 6 else "drawn", f"verify: {str(verdict).splitlines()[0]}"
     return "drawn", ""
 
 
+# What f3d does in a process of its own: argv is the mesh file, the picture, the width, the height and the axis that is up.
+F3D = """
+import sys, f3d
+engine = f3d.Engine.create(True)
+engine.window.size = int(sys.argv[3]), int(sys.argv[4])
+engine.options.update({"scene.up_direction": sys.argv[5], "ui.axis": False, "render.grid.enable": False})
+engine.scene.add(sys.argv[1])
+engine.window.camera.reset_to_bounds()
+engine.window.render_to_image().save(sys.argv[2])
+"""
+
+
+def f3d_picture(python: str, path: Path, picture: Path) -> str | None:
+    """Draws a file by f3d, and returns the path of the picture; None where there is none in time."""
+    up = "+Z" if path.suffix.lower() == ".stl" else "+Y"
+    command = [python, "-c", F3D, str(path), str(picture), *map(str, SIZE), up]
+    try:
+        subprocess.run(command, timeout=SECONDS, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    except subprocess.TimeoutExpired:
+        return None
+    return str(picture) if picture.is_file() else None
+
+
 def sheet(rows: list[dict[str, Any]], path: Path) -> None:
-    """Writes a contact sheet: the picture of each row over its outcome and the end of its path."""
+    """Writes a contact sheet: the picture of each row, and f3d's, over the end of its path and the start of its words."""
     from PIL import Image, ImageDraw
 
-    width, height = SIZE[0] + 4, SIZE[1] + LABEL + 4
-    whole = Image.new("RGB", (COLUMNS * width, -(-len(rows) // COLUMNS) * height), (20, 20, 24))
+    pictures = 2 if any("peer" in row for row in rows) else 1
+    width, height = pictures * SIZE[0] + 4, SIZE[1] + LABEL + 4
+    columns = COLUMNS // pictures
+    whole = Image.new("RGB", (columns * width, -(-len(rows) // columns) * height), (20, 20, 24))
     draw = ImageDraw.Draw(whole)
     for number, row in enumerate(rows):
-        x, y = number % COLUMNS * width + 2, number // COLUMNS * height + 2
-        if Path(row["picture"]).is_file():
-            with Image.open(row["picture"]) as picture:
-                whole.paste(picture.convert("RGB"), (x, y))
-        draw.rectangle((x, y + SIZE[1], x + SIZE[0] - 1, y + SIZE[1] + LABEL - 1), fill=COLOURS[row["outcome"]])
+        x, y = number % columns * width + 2, number // columns * height + 2
+        for place, name in enumerate((row["picture"], row.get("peer"))):
+            if name and Path(name).is_file():
+                with Image.open(name) as picture:
+                    whole.paste(picture.convert("RGB"), (x + place * SIZE[0], y))
+        draw.rectangle((x, y + SIZE[1], x + width - 5, y + SIZE[1] + LABEL - 1), fill=COLOURS[row["outcome"]])
         # The default font has 6 pixels a letter.
         draw.text((x + 3, y + SIZE[1] + 1), row["file"][-32:].encode("latin-1", "replace").decode("latin-1"))
         draw.text((x + 3, y + SIZE[1] + 13), row["words"][:32].encode("latin-1", "replace").decode("latin-1"))

@@ -240,12 +240,15 @@ def _as_triangles(scene: Scene, piece: _Piece, view: View) -> _Piece:
     film, mesh, material = scene.film, piece.mesh, piece.material
     # With one sample a pixel, squares and strips need no antialiasing, and edges between the pixels are more certain.
     on_grid = film.samples == 1 and film.supersample == 1
-    screen = Viewport(view, film.size, film.point_size, film.point_size, on_grid)
+    # The triangles are stored in float32, as a multiple of the scene's unit if that has too little range.
+    unit = _unit(piece.box, view)
+    screen = Viewport(_view_in_unit(view, unit), film.size, film.point_size, film.point_size, on_grid)
     if mesh.normals is None:
         if material is DEFAULT_MATERIAL and mesh.colours is not None and piece.item.vertex_colours:
             material = material.model_copy(update={"kd": (1.0, 1.0, 1.0)})
         material = material.model_copy(update={"unlit": True})
-    return replace(piece, mesh=stroked(mesh, piece.world, screen), world=np.eye(4), material=material)
+    triangles = stroked(mesh, _grow(unit) @ piece.world, screen)
+    return replace(piece, mesh=triangles, world=_grow(1 / unit), material=material)
 
 
 def _strokes_ready(mesh: Mesh, tangents: bool) -> Mesh:
@@ -274,27 +277,42 @@ def _in_range(assembly: Assembly, corners: Array) -> Assembly:
     All lengths are multiplied by a power of two, which rounds nothing. An assembly of ordinary size is returned as it is.
     corners: the corners of boxes round the instances (N, 3), in world space [scene units].
     """
-    view = assembly.view
-    reach = float(np.abs(corners - view.eye).max())
-    if reach == 0 or SMALLEST <= reach <= LARGEST:
+    unit = _unit(corners, assembly.view)
+    if unit == 1:
         return assembly
-    unit = 2.0 ** -round(math.log2(reach))
-    grow = np.diag([unit, unit, unit, 1.0])
+    return replace(
+        assembly,
+        instances=tuple(replace(i, world_from_object=_grow(unit) @ i.world_from_object) for i in assembly.instances),
+        lights=tuple(light.scaled(unit) for light in assembly.lights),
+        view=_view_in_unit(assembly.view, unit),
+        unit=unit,
+    )
+
+
+def _unit(corners: Array, view: View) -> float:
+    """Returns the factor of lengths, a power of two, with which the squares of all distances from the eye fit into float32.
+
+    It is 1 for a scene of ordinary size. corners: the corners of boxes round the scene (N, 3), in world space [scene units].
+    """
+    reach = float(np.abs(corners - view.eye).max())
+    return 1.0 if reach == 0 or SMALLEST <= reach <= LARGEST else 2.0 ** -round(math.log2(reach))
+
+
+def _grow(factor: float) -> Array:
+    """Returns the transform (4, 4) that multiplies lengths by a factor."""
+    return np.diag([factor, factor, factor, 1.0])
+
+
+def _view_in_unit(view: View, unit: float) -> View:
+    """Returns the view with all lengths multiplied by a factor."""
     across = 1.0 if view.perspective else unit
-    return Assembly(
-        tuple(replace(i, world_from_object=grow @ i.world_from_object) for i in assembly.instances),
-        tuple(light.scaled(unit) for light in assembly.lights),
-        replace(
-            view,
-            eye=view.eye * unit,
-            near=view.near * unit,
-            far=view.far * unit,
-            half_width=view.half_width * across,
-            half_height=view.half_height * across,
-        ),
-        assembly.objects,
-        unit,
-        assembly.own_light,
+    return replace(
+        view,
+        eye=view.eye * unit,
+        near=view.near * unit,
+        far=view.far * unit,
+        half_width=view.half_width * across,
+        half_height=view.half_height * across,
     )
 
 

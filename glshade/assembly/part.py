@@ -82,4 +82,3 @@ class Part:
         # Depth and texture coordinates are per pixel whatever the shading rate; the normal depends on the rate.
         rate = instance.rate if self.kind == "normal" else "phong"
         return replace(instance, material=solid, lights=(), number=number, rate=rate, shows=shows)
-

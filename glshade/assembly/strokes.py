@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -50,8 +51,13 @@ class Viewport:
     def key(self) -> tuple[Any, ...]:
         """A key for caches. It is equal for two viewports if points and lines become the same meshes in both."""
         view = self.view
-        seen = (view.perspective, view.eye.tobytes(), view.axes.tobytes(), view.half_width, view.half_height, view.near)
-        return (*seen, self.size, self.point_size, self.line_width, self.on_grid)
+        seen = (view.perspective, view.eye.tobytes(), view.axes.tobytes(), view.half_width, view.half_height, view.centre)
+        return (*seen, view.near, view.far, self.size, self.point_size, self.line_width, self.on_grid)
+
+    @property
+    def corner(self) -> Array:
+        """The place (2,) where the camera's axis meets the picture, from its bottom left corner, as shares of its size."""
+        return 0.5 + np.array(self.view.centre) / 2
 
 
 # mesh -> (key of a viewport, the meshes of triangles for that viewport by the bytes of their transforms). The meshes of older
@@ -93,43 +99,51 @@ def stroked(mesh: Mesh, world: Array, screen: Viewport) -> Mesh:
 def _stroked(mesh: Mesh, world: Array, screen: Viewport) -> Mesh:
     """Returns what `stroked` does, without a cache."""
     assert mesh.strokes is not None
-    positions = (mesh.positions + mesh.origin) @ world[:3, :3].T + world[:3, 3]
-    ends = mesh.strokes.astype(np.int64)
-    ends = ends[_may_be_seen(screen, positions, ends)]
-    optional = {
-        "normals": None if mesh.normals is None else mesh.normals @ _cofactors(world[:3, :3]),
-        "uvs": mesh.uvs,
-        "colours": mesh.colours,
-    }
-    given = {name: values for name, values in optional.items() if values is not None}
-    widths = {"positions": 3, **{name: values.shape[1] for name, values in given.items()}}
-    parts: dict[str, list[Any]] = {name: [] for name in widths}
-    of_points = bool((ends[:, 0] == ends[:, 1]).all())
-    for start in range(0, len(ends), BATCH):
-        made = (_squares if of_points else strips)(screen, positions, ends[start : start + BATCH])
-        parts["positions"].append((made.vertices - screen.view.eye).astype(np.float32))
+    given = {name: getattr(mesh, name) for name in ("normals", "uvs", "colours") if getattr(mesh, name) is not None}
+    widths = {"positions": 3, "normals": 3, **{name: values.shape[1] for name, values in given.items()}}
+    # The memory of rows that are never written is not taken.
+    arrays = {name: np.empty((4 * len(mesh.strokes), width), dtype=np.float32) for name, width in widths.items()}
+    # The plane of all squares is parallel to the picture.
+    written: dict[str, Any] = {"normals": screen.view.axes[2]}
+    count = 0
+    for made, vertices in _batches(mesh, world, screen):
+        rows = slice(count, count + len(made.vertices))
+        count = rows.stop
+        written["positions"] = made.vertices - screen.view.eye
         for name, values in given.items():
-            at_corners = made.interpolated(values)
+            at_ends = values[vertices]
             if name == "normals":
-                at_corners = _turned(at_corners, _toward_viewer(screen.view, made.vertices))
-            parts[name].append(at_corners.astype(np.float32))
-    count = sum(map(len, parts["positions"]))
+                normals = made.interpolated(at_ends @ _cofactors(world[:3, :3]))
+                written[name] = _turned(normals, _toward_viewer(screen.view, made.vertices))
+            else:
+                written[name] = made.interpolated(at_ends)
+        for name, array in arrays.items():
+            array[rows] = written[name]
     if not count:
-        parts = {name: [np.zeros((1, width), dtype=np.float32)] for name, width in widths.items()}
-    arrays: dict[str, Any] = {name: _joined(several) for name, several in parts.items()}
-    if mesh.normals is None:
-        # The plane of all squares is parallel to the picture.
-        arrays["normals"] = np.tile(screen.view.axes[2].astype(np.float32), (max(count, 1), 1))
+        nothing = {name: np.zeros((1, width), dtype=np.float32) for name, width in widths.items()}
+        return Mesh(triangles=np.zeros((1, 3), dtype=np.uint32), origin=screen.view.eye, **nothing)
     first = 4 * np.arange(count // 4, dtype=np.uint32)[:, None]
-    arrays["triangles"] = (first + CORNERS).reshape(-1, 3) if count else np.zeros((1, 3), dtype=np.uint32)
-    return Mesh(origin=screen.view.eye, **{name: _owned(array) for name, array in arrays.items()})
+    attributes: dict[str, Any] = {name: _owned(array[:count]) for name, array in arrays.items()}
+    return Mesh(triangles=_owned((first + CORNERS).reshape(-1, 3)), origin=screen.view.eye, **attributes)
 
 
-def _joined(parts: list[NDArray[np.float32]]) -> NDArray[np.float32]:
-    """Returns the rows of several arrays as one. The list is emptied, to save memory."""
-    result = np.concatenate(parts)
-    parts.clear()
-    return result
+def _batches(mesh: Mesh, world: Array, screen: Viewport) -> Iterator[tuple[Strips, Indices]]:
+    """Yields the corners of strokes that may be visible, and the vertices (V,) of the mesh to which their ends refer."""
+    assert mesh.strokes is not None
+    of_points = bool((mesh.strokes[:, 0] == mesh.strokes[:, 1]).all())
+    for start in range(0, len(mesh.strokes), BATCH):
+        strokes = mesh.strokes[start : start + BATCH].astype(np.int64)
+        vertices = strokes[:, 0] if of_points else strokes.reshape(-1)
+        positions = (mesh.positions[vertices] + mesh.origin) @ world[:3, :3].T + world[:3, 3]
+        outside = _outside(screen, positions)
+        if of_points:
+            seen = np.flatnonzero(outside == 0)
+            yield _squares(screen, positions, np.stack([seen, seen], axis=1)), vertices
+            continue
+        ends = np.arange(len(vertices)).reshape(-1, 2)
+        # A point of the mesh is a line from one vertex to itself.
+        ends[strokes[:, 0] == strokes[:, 1], 1] -= 1
+        yield strips(screen, positions, ends[(outside[0::2] & outside[1::2]) == 0]), vertices
 
 
 def _owned(array: NDArray[Any]) -> NDArray[Any]:
@@ -150,11 +164,12 @@ def _cofactors(linear: Array) -> Array:
     return np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)])
 
 
-def _may_be_seen(screen: Viewport, positions: Array, ends: Indices) -> Flags:
-    """Returns (S,) False for the strokes that lie outside of one of the six planes round the picture.
+def _outside(screen: Viewport, positions: Array) -> NDArray[np.uint8]:
+    """Returns the planes round the picture outside of which each of V vertices lies, as the bits of a number (V,).
 
-    positions: (V, 3), the vertices in world space.
-    ends: (S, 2), the vertices that each stroke joins.
+    A line whose two ends lie outside of the same plane is not seen.
+
+    positions: (V, 3), in world space.
     """
     view = screen.view
     x, y, z = (np.ascontiguousarray(column) for column in ((positions - view.eye) @ view.axes.T).T)
@@ -163,22 +178,14 @@ def _may_be_seen(screen: Viewport, positions: Array, ends: Indices) -> Flags:
     # A square reaches half its side beyond its centre. The samples of a pixel, and the shifted pictures of supersampling, lie
     # within one pixel.
     reach = max(screen.point_size, screen.line_width) / 2 + 1
-    half_width, half_height = (
-        half * (1 + 2 * reach / side) for half, side in zip((view.half_width, view.half_height), screen.size, strict=True)
-    )
-    seen = np.ones(len(ends), dtype=np.bool_)
-    first, second = ends[:, 0], ends[:, 1]
-    for outside in (
-        x > half_width * scale,
-        -x > half_width * scale,
-        y > half_height * scale,
-        -y > half_height * scale,
-        depth < view.near,
-        depth > view.far,
-    ):
-        if outside.any():
-            seen &= ~(outside[first] & outside[second])
-    return seen
+    planes = [depth < view.near, depth > view.far]
+    for along, half, side, centre in zip((x, y), (view.half_width, view.half_height), screen.size, view.centre, strict=True):
+        room = 1 + 2 * reach / side
+        planes += [along > half * (room - centre) * scale, along < -half * (room + centre) * scale]
+    bits = np.zeros(len(positions), dtype=np.uint8)
+    for number, outside in enumerate(planes):
+        bits |= outside.astype(np.uint8) << np.uint8(number)
+    return bits
 
 
 def _toward_viewer(view: View, points: Array) -> Array:
@@ -272,7 +279,7 @@ def _squares(screen: Viewport, positions: Array, ends: Indices) -> Strips:
     low = np.full((1, 2), -half)
     high = -low
     if screen.on_grid:
-        centre = (_pixel(screen, points) + 0.5) * screen.size
+        centre = (_pixel(screen, points) + screen.corner) * screen.size
         low, high = (_edge(centre + offset) - centre for offset in (low, high))
     size = _pixel_size(screen, points)
     low, high = low * size, high * size
@@ -307,7 +314,7 @@ def _to_grid(screen: Viewport, pixel: Array, pixel_a: Array, pixel_b: Array, off
     parallel = extent < STRAIGHT
     # Both ends of a line count as equally far along the axis across it, so that its strip becomes a rectangle.
     centre = np.where(parallel, (pixel_a + pixel_b) / 2, pixel)
-    step = _edge((centre + 0.5) * size + offset) - (pixel + 0.5) * size - offset
+    step = _edge((centre + screen.corner) * size + offset) - (pixel + screen.corner) * size - offset
     return np.where(parallel.any(axis=1, keepdims=True), step, 0.0)
 
 
@@ -334,7 +341,10 @@ def _pixel_size(screen: Viewport, points: Array) -> Array:
 
 
 def _pixel(screen: Viewport, points: Array) -> Array:
-    """Returns the positions (N, 2) of points (N, 3) in the picture, as shares of its width and height; x to the right, y up."""
+    """Returns the positions (N, 2) of points (N, 3) in the picture, as shares of its width and height; x to the right, y up.
+
+    0 is where the camera's axis meets the picture.
+    """
     view = screen.view
     flat = (points - view.eye) @ view.axes[:2].T
     result: Array = flat / (_pixel_size(screen, points) * screen.size)

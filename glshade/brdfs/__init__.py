@@ -126,9 +126,7 @@ class Brdf(Document):
     )
     emission: Colour = Field(BLACK, description=EMISSION.description)
     occlusion: OcclusionMap | None = Field(None, description="how much of the ambient light reaches each point")
-    unlit: bool = Field(
-        False, description="whether the surface shows its base colour in place of the light that it reflects"
-    )
+    unlit: bool = Field(False, description="whether the surface shows its base colour in place of the light that it reflects")
     normal_map: NormalMap | None = Field(None, description="tangent-space normals")
     bump_map: BumpMap | None = Field(None, description="heights that normals are computed from; not together with normal_map")
     tangent_direction: Turn = Field(

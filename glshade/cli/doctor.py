@@ -58,7 +58,7 @@ def _examine(results: dict[str, Any], backend: str, device: int | None, say: Any
 
     results |= {"glshade": __version__, "python": platform.python_version(), "platform": platform.platform()}
     say(f"glshade {__version__}, Python {results['python']}, {results['platform']}")
-    names = ("moderngl", "glcontext", "numpy", "OpenImageIO", "trimesh")
+    names = ("moderngl", "glcontext", "numpy", "OpenImageIO")
     results["libraries"] = {name: version(name) for name in names}
     say("libraries: " + ", ".join(f"{name} {version}" for name, version in results["libraries"].items()))
     results["egl"] = _devices()

@@ -130,7 +130,7 @@ class Surfaces:
         for number, which, part in self._by_draw():
             draw, at = self.inputs.draws[number], self.place[which]
             shiny = self._specular(draw)
-            if draw.emission.any():
+            if draw.instance.material.emits:
                 every[lights, at] = shade(self.inputs, number, replace(draw, lamps=(), surrounds=(), ambient=np.zeros(3)), part)
             for light in draw.instance.lights:
                 alone = self._lit_by(draw, light)
@@ -141,7 +141,8 @@ class Surfaces:
 
     def _lit_by(self, draw: Draw, light: int) -> Draw:
         """Returns a draw with one of its lights only, an index in the assembly's lights, and without emission."""
-        kinds, draw = self.assembly.lights, replace(draw, emission=np.zeros(3))
+        kinds, dark = self.assembly.lights, np.zeros(3)
+        draw = replace(draw, emission=dark, added={**draw.added, "emission": dark})
         if kinds[light].ignores_normal:
             ambient = wide(ambient_intensity(self.assembly, (light,), self.scene.film.exposure))
             return replace(draw, lamps=(), surrounds=(), ambient=ambient)
@@ -150,7 +151,7 @@ class Surfaces:
             for i in draw.instance.lights
             if not kinds[i].ignores_normal and kinds[i].omnidirectional == kinds[light].omnidirectional
         ]
-        number, dark = alike.index(light), np.zeros(3)
+        number = alike.index(light)
         if kinds[light].omnidirectional:
             return replace(draw, lamps=(), surrounds=(draw.surrounds[number],), ambient=dark)
         return replace(draw, lamps=(draw.lamps[number],), surrounds=(), ambient=dark)

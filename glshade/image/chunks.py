@@ -19,15 +19,14 @@ def check_chunks(data: bytes) -> None:
     while at < len(data):
         size, name = int.from_bytes(data[at : at + 4], "big"), data[at + 4 : at + 8]
         end = at + 12 + size
-        if has_pixels and name not in (b"IDAT", b"IEND"):
+        if has_pixels and name != b"IDAT":
             return
         if end > len(data):
             raise OSError("is a truncated PNG file")
         # The name of a chunk that is needed to show the picture begins with a capital letter.
         if name[:1].isupper() and zlib.crc32(data[at + 4 : end - 4]) != int.from_bytes(data[end - 4 : end], "big"):
             raise OSError("is a damaged PNG file: a checksum is wrong")
-        if name == b"IEND":
-            return
         has_pixels |= name == b"IDAT"
         at = end
-    raise OSError("is a truncated PNG file")
+    if not has_pixels:
+        raise OSError("is a truncated PNG file")

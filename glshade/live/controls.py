@@ -127,8 +127,7 @@ def _lights(scene: Scene) -> Iterator[Table]:
 
 
 def _fields(key: str, document: Document) -> Iterator[Table]:
-    """Yields a field for each value of a table that a page can change. A material's parameters and emission are left out.
-    """
+    """Yields a field for each value of a table that a page can change. A material's parameters and emission are left out."""
     parameters = {*document.parameters(), "emission"} if isinstance(document, Brdf) else set()
     for name, info in type(document).model_fields.items():
         if name not in HIDDEN and name not in parameters:

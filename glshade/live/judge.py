@@ -45,7 +45,7 @@ from glshade.live.worker import RenderWorker
 from glshade.page.ramp import RAMP, heat
 from glshade.reference.picture import render
 from glshade.scene.scene import Scene
-from glshade.verification.candidates import Candidates, find_candidates, judgeable, left_out
+from glshade.verification.candidates import Candidates, at_centres, find_candidates, judgeable, left_out
 from glshade.verification.judgement import PixelClass
 from glshade.verification.report import CLASS_MEANING
 from glshade.verification.verdict import Verdict, verdict_of
@@ -251,12 +251,12 @@ class Judge(RenderWorker):
         """Draws a scene and compares it with the reference."""
         assert self._views is not None
         self._views.revision.draw_with(self.renderer)
-        judged = judgeable(scene)
+        judged, more = at_centres(judgeable(scene))
         # The reference comes first: a model that has none is refused before anything is drawn.
         driver, shaders = measure_freedom(self.renderer.context), self._views.revision.shaders
         expected = find_candidates(judged, shading=shading, driver=driver, shaders=shaders)
         picture = self.renderer.render(judged, dtype="float32", shading=shading).pixels.copy()
-        return Trial(judged, expected, verdict_of(picture, expected, explain=False), left_out(scene))
+        return Trial(judged, expected, verdict_of(picture, expected, explain=False), (*left_out(scene), *more))
 
 
 def _sentence(trial: Trial) -> str:

@@ -26,6 +26,7 @@ class Faults:
     colours: the vertices whose colour was replaced.
     with_normals: the triangles that were given with normals.
     against: those of them that are wound against their normals.
+    visible: whether a triangle has an area; None where nobody has looked.
     """
 
     triangles: int = 0
@@ -34,6 +35,7 @@ class Faults:
     colours: int = 0
     with_normals: int = 0
     against: int = 0
+    visible: bool | None = None
 
     def lines(self) -> Iterator[str]:
         """Yields one line for each kind of fault."""
@@ -41,6 +43,8 @@ class Faults:
             yield (
                 f"{self.not_finite:,} of {self.triangles:,} triangles are left out: a corner is not finite (NaN or infinite)"
             )
+        if self.visible is False:
+            yield f"none of its {self.triangles:,} triangles has an area, so they are not visible"
         if self.uvs:
             yield f"texture coordinates of {self.uvs:,} vertices are not finite; (0, 0) is used there"
         if self.colours:

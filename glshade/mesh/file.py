@@ -1,7 +1,7 @@
 """Mesh files: loads OBJ with MTL, PLY, STL, OFF, glTF and every other format that has a reader in glshade/mesh/formats.
 
 A file is looked up in memory first and then in the user's cache folder. The readers are imported only when a file is in
-neither, because they and trimesh take more than half a second to import.
+neither.
 """
 
 from __future__ import annotations
@@ -25,6 +25,8 @@ from glshade.mesh.reading.file import MeshFile
 
 # Raise this number when a reader changes so that the same file gives another model: older cache entries are then ignored.
 LOADER_VERSION = 5
+# Git LFS checks out a text that begins like this in place of a file that it has not fetched (git-lfs, docs/spec.md).
+LFS_POINTER = b"version https://git-lfs.github.com/spec/"
 # Models that nobody refers to stay in memory up to this total size [bytes]. The newest model stays in any case.
 REMEMBERED = 32 << 20
 # A model keeps alive about this many times the bytes of its arrays: the meshes that are made from it for drawing, and their
@@ -77,6 +79,8 @@ def load(path: Path, limits: Limits = DEFAULT, folders: frozenset[Path] = frozen
         raise AssetError(f"{path}: cannot be read: {error.strerror}") from None
     if not data.strip():
         raise AssetError(f"{path}: is empty")
+    if data.startswith(LFS_POINTER):
+        raise AssetError(f"{path}: is a pointer of Git LFS and not the file itself; `git lfs pull` fetches the file")
 
     named = "\0".join(map(str, [LOADER_VERSION, full, limits.allow_outside, *sorted(folders)]))
     entry = entry_of(hashlib.sha256(os.fsencode(f"{named}\0") + data).hexdigest()[:32])

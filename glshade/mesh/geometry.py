@@ -85,6 +85,11 @@ def area_vectors(mesh: Triangles) -> Float64:
     return result
 
 
+def has_area(mesh: Triangles) -> bool:
+    """Returns whether any triangle has an area. It looks at no more triangles than it must."""
+    return any(np.any(axis) for _, corners in by_corner(mesh) for axis in _cross(corners))
+
+
 def corner_angles(mesh: Triangles) -> Float64:
     """Returns (T, 3) angles at the corners [rad]. They come from atan2, which is exact for very thin triangles too."""
     angles = np.empty((len(mesh.triangles), 3))

@@ -96,9 +96,9 @@ def unit(suffix: str, longest: float) -> dict[str, Any]:
 def surface(model: Model) -> dict[str, Any]:
     """Returns whether all triangles together are closed, and how they are wound. A value is None where it is not known.
 
-    Vertices at the same position count as one. The surface is closed if no edge belongs to one triangle alone, and "mixed" if
-    some edge runs through two triangles in the same direction. A closed surface of one direction is "outward" if it encloses a
-    positive volume, and else "inward".
+    Vertices at the same position count as one. The surface is closed if no edge belongs to one triangle alone. It is "mixed" if
+    more triangles run through some edge in one direction than in the other, not counting the last triangle of an odd number. A
+    closed surface without such edges is "outward" if it encloses a positive volume, and else "inward".
     """
     unknown = {"closed": None, "open_edges": None, "winding": None}
     if not 0 < sum(len(part.mesh.triangles) for part in model.parts) <= MOST_COMPARED:
@@ -111,18 +111,19 @@ def surface(model: Model) -> dict[str, Any]:
     a, b, c = label.reshape(-1, 3).T
     kept = (a != b) & (b != c) & (c != a)
     start, end = np.concatenate([a, b, c])[np.tile(kept, 3)], np.concatenate([b, c, a])[np.tile(kept, 3)]
-    size = int(label.max()) + 1
-    forward, count = np.unique(start * size + end, return_counts=True)
-    backward = np.isin(forward, end * size + start, assume_unique=False)
-    _, both = np.unique(np.minimum(start, end) * size + np.maximum(start, end), return_counts=True)
-    open_edges = int((both == 1).sum())
-    if bool((count > 1).any()):
-        return {"closed": open_edges == 0, "open_edges": open_edges, "winding": "mixed"}
-    if not backward.all():
-        return {"closed": False, "open_edges": open_edges, "winding": "consistent"}
+    lower, higher = np.minimum(start, end), np.maximum(start, end)
+    _, edge, count = np.unique(lower * (int(label.max()) + 1) + higher, return_inverse=True, return_counts=True)
+    # The number of triangles that run through the edge in one direction, less the number of those that run in the other.
+    surplus = np.abs(np.bincount(edge.ravel(), np.where(start < end, 1.0, -1.0), minlength=len(count)))
+    open_edges = int((count == 1).sum())
+    facts = {"closed": open_edges == 0, "open_edges": open_edges}
+    if (surplus > 1).any():
+        return {**facts, "winding": "mixed"}
+    if surplus.any():
+        return {**facts, "winding": "consistent"}
     x, y, z = corners.transpose(1, 0, 2)
     outward = float(np.einsum("ij,ij->", x, np.cross(y, z))) > 0
-    return {"closed": True, "open_edges": 0, "winding": "outward" if outward else "inward"}
+    return {**facts, "winding": "outward" if outward else "inward"}
 
 
 def _oriented(part: MeshPart) -> Float64:

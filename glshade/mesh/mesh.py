@@ -1,6 +1,6 @@
 """Mesh: an indexed triangle mesh whose arrays cannot be changed.
 
-This package imports only NumPy, because importing SciPy or trimesh would take longer than the work that they would do. Arrays
+This package imports only NumPy, because importing SciPy would take longer than the work that they would do. Arrays
 are float32, because both renderers are given these bytes. Intermediate sums and angles are computed in float64.
 """
 

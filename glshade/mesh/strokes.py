@@ -6,6 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
+from numpy.typing import NDArray
 
 from glshade.arrays import Float32, Float64, Int64
 from glshade.errors import AssetError
@@ -61,36 +62,21 @@ def build_strokes(
     lines = lines[finite] if lost else lines
     used = np.zeros(len(p), dtype=np.bool_)
     used[lines] = True
-    whole = bool(used.all())
-    number = np.cumsum(used) - 1
-
-    def of_used(array: npt.ArrayLike | None, columns: int, name: str, instead: float | None = None) -> Float64 | None:
-        """Returns the values (U, columns) of the vertices in use, with `instead`, if it is given, where one is not finite."""
-        if array is None:
-            return None
-        values = matrix(array, columns, name)
-        if len(values) != len(p):
-            raise AssetError(f"mesh has {len(p)} positions and {len(values)} {name}")
-        values = values if whole else values[used]
-        return values if instead is None else np.where(np.isfinite(values), values, instead)
-
-    n = of_used(normals, 3, "normals")
-    if n is not None:
-        n, length = normalised(n)
-        n = None if not length.any() else n
-    origin, relative = centred(p if whole else p[used])
-    return (
-        Mesh(
-            positions=relative.astype(np.float32),
-            triangles=np.zeros((0, 3), dtype=np.uint32),
-            normals=None if n is None else n.astype(np.float32),
-            uvs=_rounded(of_used(uvs, 2, "uvs", 0.0)),
-            colours=_rounded(of_used(colours, 4, "colours", 1.0)),
-            origin=origin,
-            strokes=(lines if whole else number[lines]).astype(np.uint32),
-        ),
-        lost,
+    n, uv, c = (
+        _of_used(array, columns, name, used)
+        for array, columns, name in ((normals, 3, "normals"), (uvs, 2, "uvs"), (colours, 4, "colours"))
     )
+    origin, relative = centred(p[used])
+    mesh = Mesh(
+        positions=relative.astype(np.float32),
+        triangles=np.zeros((0, 3), dtype=np.uint32),
+        normals=None if n is None else _unit_or_none(n),
+        uvs=None if uv is None else np.where(np.isfinite(uv), uv, 0.0).astype(np.float32),
+        colours=None if c is None else np.where(np.isfinite(c), c, 1.0).astype(np.float32),
+        origin=origin,
+        strokes=(np.cumsum(used) - 1)[lines].astype(np.uint32),
+    )
+    return mesh, lost
 
 
 def _checked(strokes: npt.ArrayLike, count: int) -> Int64:
@@ -106,5 +92,21 @@ def _checked(strokes: npt.ArrayLike, count: int) -> Int64:
     return lines.astype(np.int64)
 
 
-def _rounded(values: Float64 | None) -> Float32 | None:
-    return None if values is None else values.astype(np.float32)
+def _of_used(array: npt.ArrayLike | None, columns: int, name: str, used: NDArray[np.bool_]) -> Float64 | None:
+    """Returns the rows of an attribute (V, columns) that belong to vertices in use, as float64; None for None.
+
+    used: (V,), whether each vertex is used.
+    Errors: AssetError, with the attribute's name.
+    """
+    if array is None:
+        return None
+    values = matrix(array, columns, name)
+    if len(values) != len(used):
+        raise AssetError(f"mesh has {len(used)} positions and {len(values)} {name}")
+    return values[used]
+
+
+def _unit_or_none(normals: Float64) -> Float32 | None:
+    """Returns normals (V, 3) made unit, with 0 for those without a direction; None if none has a direction."""
+    unit, length = normalised(normals)
+    return unit.astype(np.float32) if length.any() else None

@@ -11,7 +11,7 @@ import numpy as np
 from glshade.arrays import Array, Float32, Int64
 from glshade.errors import AssetError
 from glshade.mesh.checking import Arrays, Faults, checked, nothing_finite
-from glshade.mesh.geometry import centred
+from glshade.mesh.geometry import centred, has_area
 from glshade.mesh.mesh import Mesh
 from glshade.mesh.welding import weld
 from glshade.mesh.winding import against_normals
@@ -55,7 +55,8 @@ def build_surface(parts: Sequence[Mapping[str, Any]], faults: Faults) -> list[Me
 
 
 def _compared(mesh: Mesh, arrays: Arrays, faults: Faults) -> Mesh:
-    """Returns the mesh, and counts its triangles that are wound against the normals that it was given."""
+    """Returns the mesh, after its areas were looked at, and its normals were compared with its winding."""
+    faults.visible = faults.visible or has_area(mesh)
     if arrays.normals is not None:
         faults.with_normals += len(mesh.triangles)
         faults.against += int(against_normals(mesh).sum())

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,28 +18,11 @@ Array = NDArray[np.float64]
 RIGID = 1e-4
 
 
-@dataclass(frozen=True, eq=False)
-class OffCentre(View):
-    """A view whose axis need not go through the middle of the picture.
-
-    centre: x, y of the point where the axis meets the picture. They go from -1 to 1 across the picture, x to the right, y up.
-    """
-
-    centre: tuple[float, float] = (0.0, 0.0)
-
-    def clip_from_world(self, zero_to_one: bool = True) -> Array:
-        clip = super().clip_from_world(zero_to_one)
-        # y points down in clip space.
-        clip[0] += self.centre[0] * clip[3]
-        clip[1] -= self.centre[1] * clip[3]
-        return clip
-
-
 class Pinhole(Perspective):
     """A perspective camera whose pixels need not be square and whose axis need not go through the middle of the picture.
 
     half: half the width and half the height of the picture at the distance 1.
-    centre: x, y of the point where the axis meets the picture, as in OffCentre.
+    centre: x, y of the point where the axis meets the picture, as in View.
     """
 
     half: tuple[float, float]
@@ -49,7 +32,7 @@ class Pinhole(Perspective):
         return self.half
 
     def view(self, points: Array, aspect: float) -> View:
-        return OffCentre(**vars(super().view(points, aspect)), centre=self.centre)
+        return replace(super().view(points, aspect), centre=self.centre)
 
 
 def camera(given: Any, pose: Array, size: tuple[int, int]) -> Camera:

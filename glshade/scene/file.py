@@ -224,7 +224,7 @@ class SceneFile:
         if problems:
             raise SceneError(problems)
         if self._checked is None:
-            for line in of_files.unused_lights(scene, models):
+            for line in of_files.remarks(scene, models):
                 warnings.warn(line, AssetWarning, stacklevel=2)
         self._checked = scene
 

@@ -23,6 +23,10 @@ if TYPE_CHECKING:
 # The key of the override that sets `file_lights` of all objects. The option `--file-lights` is this override.
 KEY = "file_lights"
 
+# Lights that show a white surface brighter than this, or darker than its inverse, where white is 1, get a line. A scene whose
+# exposure was chosen for its lights is within three stops.
+FAR = 8.0
+
 # Name of an object -> its transform to its parent's space, and the name of its parent.
 Placed = Mapping[str | None, tuple[Array, str | None]]
 
@@ -54,7 +58,7 @@ def file_cameras(scene: Scene, load: Callable[[Path], Model]) -> dict[str, Camer
     Errors: SceneError for a camera that a scene cannot have.
     """
     found = [
-        (item, name, _camera(item, name, table, transform @ np.array(table["matrix"])))
+        (item, name, _camera(item, name, table, transform))
         for item, model, transform in _files(scene, load, every=True)
         for name, table in model.cameras.items()
     ]
@@ -76,19 +80,45 @@ def file_lights(scene: Scene, load: Callable[[Path], Model]) -> tuple[Light, ...
     )
 
 
-def unused_lights(scene: Scene, models: Mapping[Path, Model]) -> Iterator[str]:
-    """Yields one line for each mesh file with lights, where neither the scene nor its object says what lights it.
+def remarks(scene: Scene, models: Mapping[Path, Model]) -> Iterator[str]:
+    """Yields one line for each mesh file with lights that are not used without a word, or that need another exposure.
 
     models: the contents of mesh files, by their paths.
     """
     for item in scene.objects:
-        silent = scene.lights is None and KEY not in item.model_fields_set
-        if silent and isinstance(item.mesh, Path) and item.mesh in models and models[item.mesh].lights:
-            count = len(models[item.mesh].lights)
+        model = models.get(item.mesh) if isinstance(item.mesh, Path) else None
+        if model is None or not model.lights:
+            continue
+        if item.file_lights:
+            yield from _exposure(scene, item, model)
+        elif scene.lights is None and KEY not in item.model_fields_set:
+            count = len(model.lights)
             yield (
                 f"{item.mesh}: has {count} {'light' if count == 1 else 'lights'} of its own, but is drawn with the default "
                 "lights; --file-lights, or file_lights = true of its object, draws it with its own"
             )
+
+
+def _exposure(scene: Scene, item: Object, model: Model) -> Iterator[str]:
+    """Yields a line if the lights of a mesh file show white surfaces far from white. The exposure is never changed unasked.
+
+    The estimate is the luminance of a white surface in the middle of the file that faces all lights, which all reach it.
+    """
+    middle = np.mean(
+        [part.transform[:3, :3] @ part.mesh.bounds.mean(axis=0) + part.transform[:3, 3] for part in model.parts], axis=0
+    )
+    luminance = 0.0
+    for light in model.lights:
+        # Within this distance a light grows no brighter, and an estimate says nothing.
+        distance = max(float(np.linalg.norm(np.subtract(light["position"], middle))), 1e-3) if "position" in light else 1.0
+        luminance += abs(light["intensity"]) * max(light["colour"]) / distance**2
+    shown = luminance * 2.0**scene.film.exposure
+    if shown > 0 and not 1 / FAR <= shown <= FAR:
+        yield (
+            f"{item.mesh}: its lights give a white surface about {luminance:.3g} cd/m^2; at the scene's exposure "
+            f"{scene.film.exposure:g} that is {shown:.3g} times white; --set film.exposure={-np.log2(luminance):.1f} "
+            "shows it as white"
+        )
 
 
 def chosen(document: Any, overrides: Overrides) -> tuple[Any, Overrides]:
@@ -116,11 +146,35 @@ def _files(scene: Scene, load: Callable[[Path], Model], every: bool) -> Iterator
             yield item, load(item.mesh), world(placements, item)
 
 
-def _camera(item: Object, name: str, table: Mapping[str, Any], matrix: Array) -> Camera:
-    """Returns a camera of a mesh file. matrix: (4, 4) from the camera to world space. Errors: SceneError."""
-    made = _validated(CAMERAS[table["type"]], {**table, "matrix": matrix.tolist()}, f"{item.mesh}: camera {name}")
+def _camera(item: Object, name: str, table: Mapping[str, Any], transform: Array) -> Camera:
+    """Returns a camera of a mesh file.
+
+    transform: (4, 4) from file space to world space. Its scale multiplies the lengths of the camera, which then shows the file
+        as before.
+
+    Errors: SceneError.
+    """
+    matrix = transform @ np.array(table["matrix"])
+    size = float(np.cbrt(abs(np.linalg.det(transform[:3, :3]))))
+    given = {key: value * size if key in ("near", "far", "height") else value for key, value in table.items()}
+    given["matrix"] = turned(matrix).tolist()
+    made = _validated(CAMERAS[table["type"]], given, f"{item.mesh}: camera {name}")
     assert isinstance(made, Camera)
     return made
+
+
+def turned(matrix: Array) -> Array:
+    """Returns the transform (4, 4) of a camera without scale, shear and mirroring: it only turns and moves.
+
+    The camera keeps its position, its direction of view, and the plane in which its up direction lies.
+    """
+    result = np.eye(4)
+    backward = matrix[:3, 2] / np.linalg.norm(matrix[:3, 2])
+    right = np.cross(matrix[:3, 1], backward)
+    right /= np.linalg.norm(right)
+    result[:3, :3] = np.stack([right, np.cross(backward, right), backward], axis=1)
+    result[:3, 3] = matrix[:3, 3]
+    return result
 
 
 def _light(item: Object, number: int, table: Mapping[str, Any], transform: Array) -> Light:

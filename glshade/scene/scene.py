@@ -41,6 +41,11 @@ def _sized(film: Film, camera: Camera) -> Film:
     return Film.model_construct(film.model_fields_set, **{**dict(film), "size": (camera.width, camera.height)})
 
 
+def _is_in(name: Any, names: set[str]) -> bool:
+    """Returns whether a value that should be a name is one of these names."""
+    return isinstance(name, str) and name in names
+
+
 class Scene(Document):
     """The whole scene: its objects, materials and lights, its cameras, and the film that records the picture."""
 
@@ -190,11 +195,11 @@ class Scene(Document):
                     yield ("objects", index, "name"), f'"{name}" is already the name of objects[{names[name]}]'
                 names.setdefault(name, index)
         parents = {name: value_of(objects[index], "parent") for name, index in names.items()}
-        followed = {value_of(item, "parent") for item in objects}
+        followed = {parent for parent in (value_of(item, "parent") for item in objects) if isinstance(parent, str)}
         for index, item in enumerate(objects):
             is_empty = value_of(item, "mesh") is None and value_of(item, "shape") is None
             # What is neither a table nor an object has a fault of its own.
-            if isinstance(item, Mapping | Object) and is_empty and value_of(item, "name") not in followed - {None}:
+            if isinstance(item, Mapping | Object) and is_empty and not _is_in(value_of(item, "name"), followed):
                 yield ("objects", index), "needs a mesh or a shape: no object names it as its parent"
             material, parent = value_of(item, "material"), value_of(item, "parent")
             if isinstance(material, str) and material not in materials and material not in PRESETS:

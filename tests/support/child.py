@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import re
@@ -47,7 +48,8 @@ class Child:
         """Ends the process, if it runs."""
         if self._process is not None:
             self._process.kill()
-            self._process.wait()
+            with contextlib.suppress(BrokenPipeError):  # what could not be written to a dead process is still buffered
+                self._process.communicate()
             self._process = None
 
     def _started(self) -> subprocess.Popen[bytes]:

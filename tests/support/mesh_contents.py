@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from glshade.errors import AssetError
 from glshade.limits import DEFAULT, Limits
 from glshade.mesh.formats import read
 from glshade.mesh.mesh import Mesh
@@ -28,6 +29,18 @@ def read_mesh(name: str, data: bytes | str, folder: Path = Path("/nowhere"), lim
     """
     raw = data.encode() if isinstance(data, str) else data
     return read(MeshFile(Path(name), folder, raw, limits=limits, folders=frozenset({folder})))
+
+
+def complaint(name: str, data: bytes) -> str:
+    """Returns the message of the reader about a file with this data; an empty text where it reads the file.
+
+    Errors: whatever the reader raises that is no AssetError.
+    """
+    try:
+        read_mesh(name, data)
+    except AssetError as error:
+        return str(error)
+    return ""
 
 
 def mesh_of(found: Contents, part: int = 0) -> Mesh:

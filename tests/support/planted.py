@@ -26,7 +26,7 @@ from glshade.brdfs.phong import Phong
 from glshade.image import srgb
 from glshade.lights import Light, Placed
 from glshade.lights.spot import SpotLight
-from glshade.mesh import facets, geometry, normals
+from glshade.mesh import facets, fans, geometry, normals
 from glshade.scene import shape
 from glshade.scene.camera import Perspective
 from glshade.scene.film import Film
@@ -258,7 +258,7 @@ def _parents_swapped(patch: pytest.MonkeyPatch) -> None:
             matrix = matrix @ above
         return matrix
 
-    patch.setattr(assembly, "_world", wrong)
+    patch.setattr(assembly, "world_of", wrong)
 
 
 def _no_grandparents(patch: pytest.MonkeyPatch) -> None:
@@ -266,11 +266,11 @@ def _no_grandparents(patch: pytest.MonkeyPatch) -> None:
         own = item.transform.array()
         return own if item.parent is None else placed[item.parent][0] @ own
 
-    patch.setattr(assembly, "_world", wrong)
+    patch.setattr(assembly, "world_of", wrong)
 
 
 def _not_welded(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(normals, "weld", lambda first, *more: np.arange(len(first)))
+    patch.setattr(fans, "weld", lambda first, *more: np.arange(len(first)))
 
 
 def _crop_shifted(patch: pytest.MonkeyPatch) -> None:
@@ -329,8 +329,8 @@ def _corner_for_centroid(patch: pytest.MonkeyPatch) -> None:
 
 
 def _worlds_rounded(patch: pytest.MonkeyPatch) -> None:
-    right = assembly._world
-    patch.setattr(assembly, "_world", lambda *given: rounded(right(*given)).astype(np.float64))
+    right = assembly.world_of
+    patch.setattr(assembly, "world_of", lambda *given: rounded(right(*given)).astype(np.float64))
 
 
 def _stretched(patch: pytest.MonkeyPatch) -> None:

@@ -25,13 +25,15 @@ def read(file: MeshFile) -> Contents:
     Errors: AssetError, one line that starts with the path, if the file is broken or holds nothing to draw.
     """
     import importlib
+    import warnings
 
-    from glshade.mesh.reading.parser import quiet
     from glshade.mesh.reading.textures import settle
 
     suffix = file.path.suffix.lower()
     try:
-        with quiet():
+        # NumPy warns about numbers in the file; the readers report what matters in their own words.
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             importlib.import_module(f"glshade.mesh.formats{suffix}").read(file)
     except AssetError:
         raise

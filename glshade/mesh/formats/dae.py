@@ -74,7 +74,7 @@ class _Scene:
         axis = (self._root.findtext("asset/up_axis") or "Y_UP").strip().upper()
         unit = self._root.find("asset/unit")
         try:
-            metres = float(unit.get("meter", "1")) if unit is not None else 1.0
+            (metres,) = words(unit.get("meter", "1")) if unit is not None else (1.0,)
         except ValueError:
             metres = float("nan")
         if not 0 < metres < float("inf"):

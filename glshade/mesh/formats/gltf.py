@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from glshade.arrays import Float64
+from glshade.limits import MOST_INSTANCES
 from glshade.mesh.mesh import Mesh
 from glshade.mesh.reading import gltf_geometry, gltf_material
 from glshade.mesh.reading.colours import with_alpha
@@ -150,6 +151,10 @@ class _Reader:
         parts = self._built[key]
         if len(key) == 3:
             transform = np.eye(4)
+        if len(self.file.contents.parts) + len(parts) > MOST_INSTANCES:
+            raise self.file.fail(
+                f"its nodes draw more than {MOST_INSTANCES:,} parts, which is the most that a picture may have"
+            )
         title = node.get("name") or self.meshes[number].get("name") or f"mesh {number}"
         for place, (known, material) in enumerate(parts):
             name = f"{title}.{place + 1}" if len(parts) > 1 else title

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from glshade.mesh.reading.colours import display_colours
 from glshade.mesh.reading.contents import Material
 from glshade.mesh.reading.faces import cut
 from glshade.mesh.reading.file import OUTSIDE, MeshFile, is_file, short, text_of
-from glshade.mesh.reading.obj_text import ABSENT, BEYOND, FACE, LINE, POINT, ObjText, read_text
+from glshade.mesh.reading.obj_text import ABSENT, FACE, LINE, ObjText, read_text
 from glshade.mesh.reading.polygon import triangulated
 from glshade.mesh.welding import weld
 
@@ -52,10 +53,17 @@ def _check_range(file: MeshFile, text: ObjText) -> None:
     Errors: AssetError, with the number of the line.
     """
     faces = text.kinds == FACE
-    few = np.flatnonzero((faces & (text.counts < 3)) | ((text.kinds == LINE) & (text.counts < 2)))
-    if len(few):
-        least = "a face needs three corners" if faces[few[0]] else "a line needs two corners"
-        raise file.fail(f"line {text.lines[few[0]]}: {least}")
+    least = np.array([3, 2, 1])[text.kinds - FACE]
+    few = text.counts < least
+    if few.any():
+        first = int(few.argmax())
+        needed = ("a face needs three corners", "a line needs two corners", "'p' needs a vertex")[text.kinds[first] - FACE]
+        message = f"line {text.lines[first]}: {needed}"
+        if few.all():
+            raise file.fail(message)
+        file.warn(f"{message}; drawn without {few.sum():,} such elements")
+        text.corners = text.corners[np.repeat(~few, text.counts)]
+        text.kinds, text.counts, text.lines, faces = text.kinds[~few], text.counts[~few], text.lines[~few], faces[~few]
     many = np.flatnonzero(faces & (text.counts > LARGEST_FACE))
     if len(many):
         counted = f"{text.counts[many[0]]:,} corners; {LARGEST_FACE:,} are allowed"
@@ -153,7 +161,7 @@ class _Parts:
         self._file, self._text = file, text
         self._states = states = _states(file, text)
         starts = np.cumsum(text.counts) - text.counts
-        kinds = np.minimum(text.kinds, POINT)
+        kinds = text.kinds
         # A part has uvs, or normals, at all corners or at none.
         form = np.zeros(len(kinds), dtype=np.int64)
         full = text.counts > 0
@@ -166,9 +174,10 @@ class _Parts:
                 form += complete * column
         key = ((states.name * len(states.materials) + states.material) * 4 + form) * 8 + kinds
         _, first, part = np.unique(key, return_index=True, return_inverse=True)
-        rank = np.empty(len(first), dtype=np.int64)
-        rank[np.argsort(first)] = np.arange(len(first))
         # Elements of one part follow one another, and so do parts of one object.
+        _, begins, same = np.unique(states.objects, return_index=True, return_inverse=True)
+        rank = np.empty(len(first), dtype=np.int64)
+        rank[np.lexsort((first, begins[same[first]]))] = np.arange(len(first))
         self._part = rank[part]
         self._order = np.argsort(self._part, kind="stable")
         named = {(int(n), int(m)) for n, m in zip(states.name[first], states.material[first], strict=True)}
@@ -187,9 +196,10 @@ class _Parts:
         used = {name for name in states.materials if name is not None}
         materials = _materials_of(file, states.libraries) if states.libraries else {}
         if used:
-            if materials:
-                for name in used - materials.keys():
-                    file.warn(f"material '{short(name)}' is in no material file; drawn without it")
+            missing = sorted(used - materials.keys())
+            if materials and missing:
+                more = f" and {len(missing) - 1:,} more" if len(missing) > 1 else ""
+                file.warn(f"material '{short(missing[0])}'{more}: in no material file; drawn without it")
         elif len(materials) == 1:
             # Scanners write such files, as those of the YCB objects; viewers such as MeshLab use the only material.
             states.materials[0] = next(iter(materials))
@@ -215,7 +225,7 @@ class _Parts:
         pieces = _Pieces(text, colours, corners, vertex, source)
         surface: list[tuple[int, dict[str, Any]]] = []
         bounds = [*starts.tolist(), len(order)]
-        for begin, end in zip(bounds[:-1], bounds[1:], strict=True):
+        for begin, end in pairwise(bounds):
             element = int(order[begin])
             chosen = order[begin:end]
             at = slice(int(ends[begin] - counts[begin]), int(ends[end - 1]))
@@ -256,9 +266,9 @@ class _Parts:
     def _add_surface(self, parts: list[tuple[int, dict[str, Any]]]) -> None:
         """Adds the parts of one object; each has an element, for its name and material, and the arrays of its mesh."""
         meshes = self._file.build_surface("", [arrays for _, arrays in parts])
-        for (element, arrays), mesh in zip(parts, meshes, strict=True):
+        for (element, _), mesh in zip(parts, meshes, strict=True):
             if mesh is not None:
-                self._file.contents.add(self._title(element, FACE), mesh, self._material(element, "uvs" in arrays))
+                self._file.contents.add(self._title(element, FACE), mesh, self._material(element))
 
     def _add_strokes(self, element: int, kind: int, counts: Int64, pieces: _Pieces, at: slice) -> None:
         """Adds a part of points or lines."""
@@ -271,8 +281,7 @@ class _Parts:
         arrays.pop("normals", None)
         strokes, positions = arrays.pop("triangles"), arrays.pop("positions")
         build = self._file.build_lines if kind == LINE else self._file.build_points
-        material = self._material(element, "uvs" in arrays)
-        self._file.contents.add(self._title(element, kind), build("", positions, strokes, **arrays), material)
+        self._file.contents.add(self._title(element, kind), build("", positions, strokes, **arrays), self._material(element))
 
     def _title(self, element: int, kind: int) -> str:
         number, material = self._key(element)
@@ -284,22 +293,16 @@ class _Parts:
             title += ".lines" if kind == LINE else ".points"
         return title
 
-    def _material(self, element: int, has_uvs: bool) -> Material | None:
+    def _material(self, element: int) -> Material | None:
         name = self._states.materials[self._states.material[element]]
-        material = self._materials.get(name) if name else None
-        if material is None or has_uvs:
-            return material
-        plain = mtl.plain(material)
-        if plain != material:
-            self._file.warn(f"material '{short(name or '')}' has textures, but faces without texture coordinates; drawn plain there")
-        return plain
+        return self._materials.get(name) if name else None
 
 
 def _vertices(corners: Array, part: Array) -> tuple[Int64, Int64]:
     """Returns the vertex (C,) of each corner, and a corner (V,) of each vertex.
 
-    Two corners of one part are one vertex if all their indices are equal. The parts must be in ascending order, and the vertices
-    are, too.
+    Two corners of one part are one vertex if all their indices are equal. The parts must be in ascending order, as the
+    vertices are then.
     """
     place, uv, normal = (corners[:, column].astype(np.int64) for column in range(3))
     if part[-1] == 0 and all((other == place).all() or (other == ABSENT).all() for other in (uv, normal)):

@@ -16,7 +16,7 @@ from glshade.arrays import Array, Float64, Int64
 from glshade.mesh.reading.colours import display_colours
 from glshade.mesh.reading.faces import cut
 from glshade.mesh.reading.file import MeshFile, text_of
-from glshade.mesh.reading.numbers import numbers
+from glshade.mesh.reading.number_text import numbers
 
 # The keyword of the header. Its letters announce texture coordinates (ST), colours (C), normals (N), a fourth coordinate (4)
 # and any number of coordinates (n). The keyword is optional, and a few programs write no space behind it.

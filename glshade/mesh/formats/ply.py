@@ -195,6 +195,10 @@ def _add_triangles(
         rows = np.flatnonzero(chosen == number)
         parts.append(_part(triangles, rows, arrays, uvs, colours))
         materials.append(_material(file, _pictures(head)[number]) if number >= 0 else None)
+        if materials[-1] is not None and parts[-1]["colours"] is not None:
+            # MeshLab writes both, and shows one of them.
+            file.warn("has textures and colours; drawn with the textures where there are some")
+            parts[-1]["colours"] = None
     for mesh, material in zip(file.build_surface("", parts), materials, strict=True):
         if mesh is not None:
             file.contents.add(file.path.stem, mesh, material)

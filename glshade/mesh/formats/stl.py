@@ -15,12 +15,15 @@ import numpy as np
 from glshade.arrays import Array, Float64
 from glshade.mesh.reading.colours import display_colours
 from glshade.mesh.reading.file import MeshFile, short
-from glshade.mesh.reading.numbers import numbers
+from glshade.mesh.reading.number_text import numbers
 
 _HEADER = 84
 _ROW = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 # Binary files have a zero byte here at the latest: byte 83, the highest of the number of triangles, is 0 below 16.7 million.
 _START = 1024
+_NOT_X_OR_P = bytes(set(range(256)) - set(b"xp"))
+# The text that is read at once [bytes]; larger pieces are not faster and take more memory.
+_BLOCK = 1 << 22
 _SOLID = re.compile(rb"^[ \t]*+(end)?solid\b([^\n]*)", re.IGNORECASE | re.MULTILINE)
 _NORMAL = re.compile(rb"\bfacet\s++normal\s++\S++\s++\S++\s++\S++", re.IGNORECASE)
 _WORDS = re.compile(rb"\b(?:(?:end)?(?:facet|loop)|outer|vertex|normal)\b", re.IGNORECASE)
@@ -94,7 +97,7 @@ def _colours(header: bytes, attributes: Array) -> Float64 | None:
 
 def _read_text(file: MeshFile) -> None:
     """Adds a part for each solid of a text file. Errors: AssetError, with the line."""
-    text = file.data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    text = file.data.removeprefix(b"\xef\xbb\xbf").replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     marks = list(_SOLID.finditer(text))
     ends = [mark.start() for mark in marks] + [len(text)]
     # What stands before the first line "solid" has no name.
@@ -116,17 +119,39 @@ def _read_text(file: MeshFile) -> None:
 
 def _corners(file: MeshFile, body: bytes, line: int) -> Float64:
     """Returns the corners (T, 3, 3) of the triangles in the text of one solid. line: its first line. Errors: AssetError."""
-    loops = [found.end() for found in _END_OF_LOOP.finditer(body)]
-    last = loops[-1] if loops else 0
-    if re.search(rb"\bvertex\b", body[last:], re.IGNORECASE):
-        file.warn("ends within a triangle; drawn without it")
-    body = _NORMAL.sub(_blank, body[:last])
-    values, problem = numbers(_WORDS.sub(b" ", body), line)
+    pieces = [np.empty((0, 3, 3))]
+    start = 0
+    while start < len(body):
+        # A block ends where a loop ends.
+        found = _END_OF_LOOP.search(body, min(start + _BLOCK, len(body)))
+        block = body[start : found.end() if found else len(body)]
+        start += len(block)
+        ends = [end.end() for end in _END_OF_LOOP.finditer(block)]
+        last = ends[-1] if ends else 0
+        if re.search(rb"\bvertex\b", block[last:], re.IGNORECASE):
+            file.warn("ends within a triangle; drawn without it")
+        pieces.append(_triangles(file, block[:last], line, len(ends)))
+        line += block.count(b"\n")
+    return np.concatenate(pieces)
+
+
+def _triangles(file: MeshFile, block: bytes, line: int, count: int) -> Float64:
+    """Returns the corners (T, 3, 3) in a block of text with `count` loops. line: its first line. Errors: AssetError."""
+    lower = block.lower()
+    # The letter x stands in "vertex" alone, and p in "outer loop" and "endloop".
+    is_regular = lower.translate(None, _NOT_X_OR_P) == b"pxxxp" * count
+    if is_regular:
+        # In most files all numbers can be read, three of a normal and nine of corners for each facet, once the words are gone.
+        for word in (b"facet", b"normal", b"outer", b"vertex", b"loop", b"end"):
+            lower = lower.replace(word, b" ")
+        values, problem = numbers(lower)
+        if not problem and len(values) == 12 * count:
+            return values.reshape(-1, 4, 3)[:, 1:]
+    block = _NORMAL.sub(_blank, block)
+    values, problem = numbers(_WORDS.sub(b" ", block), line)
     if problem:
         raise file.fail(problem)
-    if len(values) == 9 * len(loops):
-        return values.reshape(-1, 3, 3)
-    return _fans(file, body, line)
+    return values.reshape(-1, 3, 3) if is_regular and len(values) == 9 * count else _fans(file, block, line)
 
 
 def _blank(found: re.Match[bytes]) -> bytes:

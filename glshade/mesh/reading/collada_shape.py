@@ -12,7 +12,7 @@ from glshade.arrays import Float64, Int64
 from glshade.errors import printable
 from glshade.mesh.reading.faces import cut, strips
 from glshade.mesh.reading.file import MeshFile, short
-from glshade.mesh.reading.numbers import numbers
+from glshade.mesh.reading.number_text import numbers
 
 _POLYGONS = ("triangles", "polylist", "polygons")
 _LINES = ("lines", "linestrips")

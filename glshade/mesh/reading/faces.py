@@ -10,7 +10,7 @@ from glshade.arrays import Array, Float64, Int64
 from glshade.mesh.reading.polygon import triangulated
 
 # The corners of polygons that are examined at once. Their positions and edges take about 200 bytes each.
-_BLOCK = 1 << 18
+_BLOCK = 1 << 16
 # A corner counts as convex up to this turn inward, relative to the square of twice the polygon's area. Corners on a straight
 # side, whose positions were rounded to float32, turn inward by about 1e-7.
 _STRAIGHT = 1e-6

@@ -129,7 +129,7 @@ class MeshFile:
         return mesh
 
     def build_surface(self, where: str, parts: Sequence[Mapping[str, Any]]) -> list[Mesh | None]:
-        """Returns the meshes of the parts of one surface, as in glshade.mesh.surface; None for a part that has no triangle left.
+        """Returns the meshes of the parts of one surface, as in glshade.mesh.surface; None for a part without triangles.
 
         What is left out or replaced is counted in `faults`.
         Errors: AssetError, with path and `where` in front.

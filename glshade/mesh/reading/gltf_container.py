@@ -27,8 +27,10 @@ def opened(file: MeshFile) -> tuple[dict[str, Any], list[bytes]]:
     data, binary = _chunks(file) if file.data[:4] == MAGIC else (file.data, None)
     try:
         header = json.loads(data.decode("utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise file.fail(f"is not glTF: its JSON cannot be read: {error}") from None
+    except json.JSONDecodeError as error:
+        raise file.fail(f"is not glTF: its JSON cannot be read at line {error.lineno}, column {error.colno}") from None
+    except (ValueError, RecursionError):  # no UTF-8 text, a number of thousands of digits, or too many brackets
+        raise file.fail("is not glTF: its JSON cannot be read; export the file again") from None
     if not isinstance(header, dict) or not isinstance(header.get("asset"), dict):
         raise file.fail("is not glTF: it has no 'asset'")
     _check_version(file, header)

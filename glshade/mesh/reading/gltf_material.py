@@ -10,7 +10,7 @@ from typing import Any
 from urllib.parse import unquote, unquote_to_bytes
 
 from glshade.mesh.reading.contents import EMBEDDED, Material
-from glshade.mesh.reading.file import MeshFile
+from glshade.mesh.reading.file import MeshFile, short
 from glshade.mesh.reading.gltf_json import LARGEST, Table
 
 # The size of the embedded pictures, in sizes of the file and its buffers.
@@ -129,7 +129,7 @@ class _Converter:
 
     def warn(self, message: str) -> None:
         """Adds a warning that names the material."""
-        self.file.warn(f"material '{self.given.text('name', '')}': {message}")
+        self.file.warn(f"material '{short(self.given.text('name', ''))}': {message}")
 
     def converted(self) -> Material:
         """Returns the material table."""
@@ -148,7 +148,7 @@ class _Converter:
         result |= self._coverage(opacity) | self._maps()
         missing = sorted(name for name in self.extensions.value if name not in EXTENSIONS and self._shows(name))
         if missing:
-            self.warn(f"drawn without {', '.join(missing)}, which glshade does not have")
+            self.warn(f"drawn without {short(', '.join(missing))}, which glshade does not have")
         return result
 
     def _shows(self, extension: str) -> bool:
@@ -220,7 +220,7 @@ class _Converter:
         result: Material = {"sides": "both" if self.given.value.get("doubleSided") is True else "front"}
         mode = self.given.text("alphaMode", "OPAQUE")
         if mode not in ("OPAQUE", "MASK", "BLEND"):
-            self.file.warn(f"{self.given.at('alphaMode')} is '{mode}', which does not exist; drawn opaque")
+            self.file.warn(f"{self.given.at('alphaMode')} is '{short(mode)}', which does not exist; drawn opaque")
         if mode in ("MASK", "BLEND"):
             result |= {"alpha": opacity, "alpha_mode": mode.lower()}
         if mode == "MASK":
@@ -313,7 +313,7 @@ class _Converter:
         if source is None:
             source = extensions.table("EXT_texture_webp").index("source")
         if source is None:
-            kinds = ", ".join(sorted(set(extensions.value) - EXTENSIONS))
+            kinds = short(", ".join(sorted(set(extensions.value) - EXTENSIONS)))
             reason = f"is stored with {kinds} alone, which cannot be read" if kinds else "names no picture"
             self.file.warn(f"{texture.place} {reason}; drawn without it")
             return None

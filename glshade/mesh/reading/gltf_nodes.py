@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from glshade.arrays import Array, Float64
+from glshade.limits import MOST_INSTANCES
 from glshade.mesh.reading.file import MeshFile
 from glshade.mesh.reading.gltf_accessors import Accessors
 
@@ -57,8 +58,11 @@ class Nodes:
         KHR_node_visibility hides is left out with all its children.
         """
         scenes = self.header.get("scenes", [])
+        chosen = self.header.get("scene", 0)
+        if scenes and chosen >= len(scenes):
+            raise self.file.fail(f"scene is {chosen}, but the file has {len(scenes)} scenes, numbered from 0")
         if scenes:
-            roots = scenes[self.header.get("scene", 0)].get("nodes", [])
+            roots = scenes[chosen].get("nodes", [])
         else:
             roots = np.flatnonzero(self.parents < 0).tolist()
         # A scene may name a node twice, or name a child of another of its nodes; each node is drawn once.
@@ -173,7 +177,8 @@ def instances(accessors: Accessors, node: dict[str, Any]) -> Float64 | None:
             f"EXT_mesh_gpu_instancing: its attributes have {sorted(counts)} elements, not the same number"
         )
     count = counts.pop() if counts else 0
-    accessors.spend(0, 3 * count)
+    if count > MOST_INSTANCES:
+        raise accessors.file.fail(f"EXT_mesh_gpu_instancing draws {count:,} copies of a mesh; {MOST_INSTANCES:,} are allowed")
     parts = [
         accessors.floats(given[name], (width,)) if name in given else np.tile(default, (count, 1))
         for name, (width, default) in kinds.items()

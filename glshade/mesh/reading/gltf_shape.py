@@ -198,7 +198,7 @@ _HEADER = _table(
     extensionsRequired=_list(_text),
     extensionsUsed=_list(_text),
     extensions=_table(KHR_lights_punctual=_table(lights=_list(_LIGHT))),
-    scene=_reference("scenes"),
+    scene=_whole,
     scenes=_list(_table(nodes=_list(_reference("nodes")))),
     nodes=_list(_NODE),
     meshes=_list(_table(("primitives",), name=_text, primitives=_list(_PRIMITIVE), weights=_NUMBERS)),

@@ -16,6 +16,8 @@ from glshade.mesh.reading.file import MeshFile
 
 # The deepest nesting of elements. COLLADA nests one node in another; a chain of nodes may be as long in a scene file.
 _DEEPEST = 512
+# The elements that `tree` keeps, about 150 bytes each. Polygons with an element each take the most of them.
+_MOST_ELEMENTS = 4_000_000
 
 Start: TypeAlias = Callable[[str, dict[str, str]], object]
 
@@ -88,10 +90,19 @@ _EARLY = {expat.errors.codes[text] for text in (expat.errors.XML_ERROR_NO_ELEMEN
 def tree(file: MeshFile, data: bytes) -> Element:
     """Returns the root of an XML document. Names of elements have no prefixes. Errors: AssetError, with the line."""
     builder = TreeBuilder()
-    parse(file, "", [data], builder.start, builder.end, builder.data)
+    count = 0
+
+    def start(name: str, attributes: dict[str, str]) -> None:
+        nonlocal count
+        count += 1
+        if count > _MOST_ELEMENTS:
+            raise file.fail(f"has more than {_MOST_ELEMENTS:,} XML elements")
+        builder.start(name, attributes)
+
+    parse(file, "", [data], start, builder.end, builder.data)
     return builder.close()
 
 
 def words(text: str) -> list[float]:
-    """Returns the numbers of a short text. Programs that follow the user's language write a comma in them. Errors: ValueError."""
+    """Returns the numbers of a short text. Some programs write a comma in place of the point. Errors: ValueError."""
     return [float(word) for word in text.replace(",", ".").split()]

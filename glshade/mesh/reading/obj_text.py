@@ -1,7 +1,7 @@
-"""OBJ text: reads the statements of an OBJ file into arrays, in pieces, so that the text is never held as Python objects.
+"""OBJ text: reads the statements of an OBJ file into arrays, in pieces, without a Python object for each line.
 
-The words of a piece are found with NumPy. Python looks only at lines that are neither numbers nor corners, such as "usemtl", and
-at the lines of a piece in which NumPy met something that is no number.
+The words of a piece are found with NumPy. Python looks only at lines that are neither numbers nor corners, such as "usemtl",
+and at the lines of a piece in which NumPy met something that is no number.
 """
 
 from __future__ import annotations
@@ -36,12 +36,17 @@ STATES = frozenset({"o", "g", "s", "usemtl", "mtllib"})
 _FREE_FORM = frozenset({"curv", "curv2", "surf"})
 _FILES = frozenset({"call", "csh"})
 
+# The first letters of these statements. Lines with another one are not looked at.
+_HEADS = np.array([ord(head) for head in sorted({word[0] for word in STATES | _FREE_FORM | _FILES})], dtype=np.uint8)
+
 # The numbers that each form of corner holds, as columns of a corner: v, v/vt, v//vn and v/vt/vn.
 _FORMS = ((0,), (0, 1), (0, 2), (0, 1, 2))
 _CORNER = re.compile(rb"[-+]?\d+(/([-+]?\d+)?(/([-+]?\d+)?)?)?")
+# The number at the beginning of a word, which is all that programs in C read of "3.1+e2".
+_BEGIN = re.compile(rb"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 _OF_CORNERS = np.zeros(256, dtype=bool)
 _OF_CORNERS[list(b"0123456789+-/")] = True
-_OF_CORNERS[:33] = True  # control characters count as spaces
+_OF_CORNERS[list(b" \t\n\v\f\r")] = True
 
 
 @dataclass
@@ -55,7 +60,7 @@ class ObjText:
     kinds: (E,) FACE, LINE or POINT for each element.
     counts: (E,) the number of corners of each element.
     lines: (E,) the number of the line of each element, from 1.
-    corners: (C, 3) int32, the indices of position, uv and normal from 0, or ABSENT or BEYOND, of all elements one after another.
+    corners: (C, 3) int32, the indices of position, uv and normal from 0, or ABSENT or BEYOND, element by element.
     states: the statements of STATES in their order: the number of the line, the first word and the rest of the line.
     free_form: whether the file has free-form curves or surfaces.
     """
@@ -164,14 +169,14 @@ class _Reader:
             self.beyond.append(None)
 
     def _rows(self, piece: _Piece, kind: int) -> tuple[Float64, Array]:
-        """Returns the numbers (n, 3 to 7) of all lines of a kind, with 0 for those that are left out, and their numbers (n,)."""
+        """Returns the numbers (n, 3 to 7) of all lines of a kind, with 0 for absent ones, and how many each holds (n,)."""
         lines = np.flatnonzero(piece.kinds == kind)
         widths = piece.words[lines] - 1
         if not len(lines):
             return np.zeros((0, 3)), widths
         if widths.min() < _LEAST[kind]:
             line = piece.number(lines[int((widths < _LEAST[kind]).argmax())])
-            raise self.file.fail(f"line {line:,}: '{_WORDS[kind].decode()}' needs at least {_LEAST[kind]} numbers")
+            raise self.file.fail(f"line {line}: '{_WORDS[kind].decode()}' needs at least {_LEAST[kind]} numbers")
         rows = np.zeros((len(lines), max(3, min(int(widths.max()), 7))))
         for width in np.unique(widths).tolist():
             chosen = np.flatnonzero(widths == width)
@@ -188,7 +193,9 @@ class _Reader:
         except (ValueError, DeprecationWarning):  # older NumPy warns where newer NumPy raises
             pass
         split = text.split(b"\n")
-        return np.array([[self._number(word, piece.number(n)) for word in t.split()] for n, t in zip(lines, split, strict=False)])
+        return np.array(
+            [[self._number(word, piece.number(n)) for word in t.split()] for n, t in zip(lines, split, strict=False)]
+        )
 
     def _number(self, word: bytes, line: int) -> float:
         try:
@@ -197,7 +204,11 @@ class _Reader:
             # Microsoft's C library writes NaN as "-1.#IND" or "-nan(ind)", and infinity as "1.#INF".
             if b".#" in word or b"nan" in word.lower():
                 return math.nan
-            raise self.file.fail(f"line {line:,}: '{_shown(word)}' is not a number") from None
+            begin = _BEGIN.match(word)
+            if begin is None or b"," in word:
+                raise self.file.fail(f"line {line}: '{_shown(word)}' is not a number") from None
+            self.file.warn(f"line {line}: '{_shown(word)}' is not a number; read as {begin[0].decode()}")
+            return float(begin[0])
 
     def _elements(self, piece: _Piece, before: list[Int64]) -> None:
         lines = np.flatnonzero((piece.kinds >= FACE) & (piece.kinds <= POINT))
@@ -230,7 +241,7 @@ class _Reader:
         slashes = np.flatnonzero(text == ord("/"))
         doubles = slashes[:-1][np.diff(slashes) == 1]
         forms: Array = np.zeros(len(starts), dtype=np.int8)
-        wrong = ~_OF_CORNERS[np.frombuffer(piece.bytes_of(lines), dtype=np.uint8)].all()
+        wrong = not _OF_CORNERS[np.frombuffer(piece.bytes_of(lines), dtype=np.uint8)].all()
         if len(slashes):
             number = np.searchsorted(slashes, ends) - np.searchsorted(slashes, starts)
             double = np.searchsorted(doubles, ends) > np.searchsorted(doubles, starts) if len(doubles) else np.zeros(1, bool)
@@ -253,7 +264,7 @@ class _Reader:
                 word = text[start:end].tobytes()
                 if not _CORNER.fullmatch(word):
                     line = piece.number(lines[int(np.searchsorted(np.cumsum(counts), at, side="right"))])
-                    raise self.file.fail(f"line {line:,}: '{_shown(word)}' is not a corner of a face; write v, v/vt or v/vt/vn")
+                    raise self.file.fail(f"line {line}: '{_shown(word)}' is not a corner of a face; write v, v/vt or v/vt/vn")
 
     def text(self) -> ObjText:
         """Returns everything. The lists are emptied, so that each array exists twice for a moment only."""
@@ -294,7 +305,8 @@ class _Reader:
         if largest > _LARGEST_FRACTION:
             colours[:, :3] /= 255
             colours[:, 3] = np.where(colours[:, 3] > _LARGEST_FRACTION, colours[:, 3] / 255, colours[:, 3])
-        return np.nan_to_num(np.clip(colours, 0.0, 1.0), nan=1.0)
+        result: Float64 = np.nan_to_num(np.clip(colours, 0.0, 1.0), nan=1.0)
+        return result
 
 
 # Colours whose largest value is above this are bytes.
@@ -306,6 +318,14 @@ def _joined(pieces: list[Array], empty: tuple[int, ...], dtype: type) -> Array:
     result = np.concatenate(pieces) if pieces else np.zeros(empty, dtype=dtype)
     pieces.clear()
     return result
+
+
+def _decoded(text: bytes) -> str:
+    """Returns a text in UTF-8, or else in Latin-1."""
+    try:
+        return text.decode()
+    except UnicodeDecodeError:
+        return text.decode("latin-1")
 
 
 def _shown(word: bytes) -> str:
@@ -348,7 +368,8 @@ class _Piece:
     def _find_words(self) -> None:
         space = np.empty(len(self.array) + 1, dtype=bool)
         space[0] = True
-        np.less_equal(self.array, 32, out=space[1:])
+        np.less(self.array - np.uint8(9), 5, out=space[1:])  # \t, \n, \v, \f and \r; smaller bytes wrap round
+        space[1:] |= self.array == 32
         change = np.flatnonzero(space[1:] != space[:-1])
         self._word_starts, self._word_ends = change[::2], change[1::2]
         before = np.searchsorted(self._word_starts, self._starts)
@@ -362,9 +383,8 @@ class _Piece:
         word = self._first_word[filled]
         start, length = self._word_starts[word], self._word_ends[word] - self._word_starts[word]
         self._first[filled] = start
-        kinds = np.full(len(filled), _OTHER, dtype=np.int8)
         head, second = self.array[start], self.array[start + 1]
-        kinds[head == ord("#")] = _NOTHING
+        kinds = np.where(np.isin(head, _HEADS), _OTHER, _NOTHING).astype(np.int8)
         for kind, name in enumerate(_WORDS):
             alike = (length == len(name)) & (head == name[0])
             kinds[alike & (second == name[1]) if len(name) == 2 else alike] = kind
@@ -394,14 +414,16 @@ class _Piece:
             return self.array.tobytes()
         chosen = np.zeros(len(self.words), dtype=bool)
         chosen[lines] = True
-        return self.array[np.repeat(chosen, self._ends - self._starts + 1)].tobytes()
+        text: bytes = self.array[np.repeat(chosen, self._ends - self._starts + 1)].tobytes()
+        return text
 
     def bytes_between(self, starts: Int64, ends: Int64) -> bytes:
         """Returns the text of words, each with the space that follows it."""
         change = np.zeros(len(self.array) + 1, dtype=np.int8)
         change[starts] += 1
         change[ends + 1] -= 1
-        return self.array[np.cumsum(change[:-1], dtype=np.int8) > 0].tobytes()
+        result: bytes = self.array[np.cumsum(change[:-1], dtype=np.int8) > 0].tobytes()
+        return result
 
     def words_of(self, lines: Int64) -> tuple[Int64, Int64]:
         """Returns the starts and ends (C,) of all words of lines (n,) but the first."""
@@ -414,10 +436,5 @@ class _Piece:
     def others(self) -> Iterator[tuple[int, str, str]]:
         """Yields the number of the line, the first word and the rest of each line that is neither numbers nor corners."""
         for line in np.flatnonzero(self.kinds == _OTHER).tolist():
-            raw = self._text[self._starts[line] : self._ends[line]]
-            try:
-                text = raw.decode()
-            except UnicodeDecodeError:
-                text = raw.decode("latin-1")
-            word, *rest = text.split(None, 1)
-            yield self.number(line), word, " ".join(rest[0].split()) if rest else ""
+            word, *rest = self._text[self._starts[line] : self._ends[line]].split(None, 1)
+            yield self.number(line), word.decode("latin-1"), " ".join(_decoded(rest[0]).split()) if rest else ""

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from glshade.arrays import Array, Int64
-from glshade.errors import printable
+from glshade.errors import AssetError
 from glshade.mesh.reading.file import MeshFile, short
-from glshade.mesh.reading.numbers import numbers
+from glshade.mesh.reading.number_text import numbers
 
 # The names of types in headers -> NumPy's names. Turk's description has the first eight; the others are what programs write.
 _TYPES = {
@@ -151,30 +151,79 @@ def _property(file: MeshFile, number: int, words: list[str]) -> Property:
 
 def tables(file: MeshFile, head: Header) -> dict[str, Table]:
     """Returns the tables of a PLY file by the names of their elements. Errors: AssetError, with element and row."""
-    data: bytes | memoryview = file.data
-    problem = ""
-    position, end, unit = head.size, len(data), "bytes"
-    order = _FORMATS[head.form]
-    elements = head.elements
+    if head.form != "ascii":
+        return _tables(file, head, file.data, head.size)[0]
+    text = file.data[head.size :]
+    result, left, error = None, 0, None
+    try:
+        result, left = _text_tables(file, head, text)
+    except AssetError as fault:
+        error = fault
+    if error is not None or left:
+        # A row is a line. What follows on its line after the numbers that the header declares is left out.
+        trimmed = _without_tails(text, head.elements)
+        if trimmed is not None:
+            file.warn("its lines have more numbers than the header declares; drawn without them")
+            return _text_tables(file, head, trimmed)[0]
+    if result is None:
+        assert error is not None
+        raise error
+    if left:
+        file.warn(f"{left:,} numbers after its last element are not read")
+    return result
+
+
+def _text_tables(file: MeshFile, head: Header, text: bytes) -> tuple[dict[str, Table], int]:
+    """Returns the tables of a file in text form, and the number of numbers that follow them. Errors: AssetError."""
+    values, problem = numbers(text, head.lines + 1)
+    data = values.astype("<f8", copy=False).view(np.uint8).data
+    tables, position = _tables(file, head, data, 0, problem)
+    return tables, len(values) - position // 8
+
+
+def _without_tails(text: bytes, elements: list[Element]) -> bytes | None:
+    """Returns the rows of a text, each without the numbers that no property declares.
+
+    The result is None where rows are no lines, or where they have no such numbers.
+    """
+    lines = iter([line for line in re.split(rb"[\r\n]", text) if line.strip()])
+    rows, tails = [], False
+    try:
+        for element in elements:
+            for _ in range(element.count if element.properties else 0):
+                words, size = next(lines).split(), 0
+                for p in element.properties:
+                    size += 1 if p.length is None else 1 + int(words[size])
+                if not 0 <= size <= len(words):
+                    return None
+                rows.append(b" ".join(words[:size]))
+                tails |= size < len(words)
+    except (StopIteration, ValueError, IndexError):
+        return None
+    return b"\n".join(rows) if tails else None
+
+
+def _tables(
+    file: MeshFile, head: Header, data: bytes | memoryview, position: int, problem: str = ""
+) -> tuple[dict[str, Table], int]:
+    """Returns the tables in `data` from a position on, and the position after them. Errors: AssetError.
+
+    problem: a message about what ended the numbers of the text form; empty where nothing did.
+    """
+    elements, unit, scale = head.elements, "bytes", 1
     if head.form == "ascii":
-        values, problem = numbers(file.data[head.size :], head.lines + 1)
-        data, position, unit = values.astype("<f8", copy=False).view(np.uint8).data, 0, "numbers"
-        end = len(data)
-        elements = [_as_float64(element) for element in elements]
+        elements, unit, scale = [_as_float64(element) for element in elements], "numbers", 8
     result: dict[str, Table] = {}
     for element, declared in zip(elements, head.elements, strict=True):
-        reader = _Rows(data, position, end, order, element)
         try:
-            table, position = reader.read()
+            table, position = _Rows(data, position, len(data), _FORMATS[head.form], element).read()
         except _Wrong as wrong:
-            scale = 8 if unit == "numbers" else 1
-            message = wrong.message.format(
-                unit=unit, missing=f"{-(-wrong.needed // scale):,}", there=f"{wrong.there // scale:,}"
-            )
+            missing, there = f"{-(-wrong.needed // scale):,}", f"{wrong.there // scale:,}"
+            message = wrong.message.format(unit=unit, missing=missing, there=there)
             raise file.fail(f"element {_quoted(element.name)}: {problem or message}") from None
         kinds = {p.name: p.kind for p in declared.properties}
         result.setdefault(element.name, Table(table.count, table.columns, table.lists, kinds))
-    return result
+    return result, position
 
 
 def _as_float64(element: Element) -> Element:
@@ -337,4 +386,5 @@ def _decoded(line: bytes) -> str:
 
 
 def _quoted(text: str) -> str:
-    return printable(short(text))
+    """Returns a text for a message, in which a number stands for a letter that cannot be seen, such as a soft hyphen."""
+    return "".join(letter if letter.isprintable() else f"\\u{ord(letter):04x}" for letter in short(text))

@@ -53,7 +53,7 @@ class _Clipping:
     def __init__(self, flat: Float64) -> None:
         """flat: the outline (N, 2), counter-clockwise."""
         count = len(flat)
-        self._points = [(x, y) for x, y in flat.tolist()]
+        self._points: list[tuple[float, float]] = [(x, y) for x, y in flat.tolist()]
         self._next = [*range(1, count), 0]
         self._last = [count - 1, *range(count - 1)]
         turns = _turns(np.roll(flat, 1, axis=0), flat, np.roll(flat, -1, axis=0))
@@ -91,7 +91,39 @@ class _Clipping:
                 if self._turn(self._last[end], end, self._next[end]) >= 0:
                     queue.extend(self._released(end))
         first = next(k for k, there in enumerate(present) if there)
-        return [*result, (first, self._next[first], self._last[first])]
+        return self._straightened([*result, (first, self._next[first], self._last[first])])
+
+    def _straightened(self, triangles: list[tuple[int, int, int]]) -> list[tuple[int, int, int]]:
+        """Returns the triangles, none of which is a mere line if that can be avoided.
+
+        Where a triangle's corner lies on its opposite side, that side is shared with another triangle. The side is replaced by
+        the line from the corner to the other triangle's free corner.
+        """
+        owners = {(t[k - 1], t[k]): index for index, t in enumerate(triangles) for k in range(3)}
+        lines = [index for index, t in enumerate(triangles) if self._turn(*t) == 0]
+        for _ in range(2 * len(triangles)):  # every line needs one step, and may make another line of its neighbour
+            if not lines:
+                break
+            index = lines.pop()
+            m, x, y = max(
+                (t[k:] + t[:k] for t in [triangles[index]] for k in range(3)), key=lambda t: self._length2(t[1], t[2])
+            )
+            other = owners.get((y, x))
+            if other is None:
+                continue
+            free = next(corner for corner in triangles[other] if corner not in (x, y))
+            if self._turn(m, x, free) < 0 or self._turn(m, free, y) < 0:
+                continue
+            for place, t in ((index, (m, x, free)), (other, (m, free, y))):
+                triangles[place] = t
+                owners |= {(t[k - 1], t[k]): place for k in range(3)}
+                if self._turn(*t) == 0:
+                    lines.append(place)
+        return triangles
+
+    def _length2(self, a: int, b: int) -> float:
+        (ax, ay), (bx, by) = self._points[a], self._points[b]
+        return (bx - ax) ** 2 + (by - ay) ** 2
 
     def _turn(self, a: int, b: int, c: int) -> float:
         (ax, ay), (bx, by), (cx, cy) = self._points[a], self._points[b], self._points[c]
@@ -108,8 +140,9 @@ class _Clipping:
         a, c = self._last[b], self._next[b]
         if self._turn(a, b, c) <= 0:
             return False
-        corners = (ax, ay), (bx, by), (cx, cy) = self._points[a], self._points[b], self._points[c]
-        first, end = np.searchsorted(self._xs, min(ax, bx, cx)), np.searchsorted(self._xs, max(ax, bx, cx), side="right")
+        corners = self._points[a], self._points[b], self._points[c]
+        least, *_, greatest = sorted(x for x, _ in corners)
+        first, end = np.searchsorted(self._xs, least), np.searchsorted(self._xs, greatest, side="right")
         x, y, within = self._xs[first:end], self._ys[first:end], self._alive[first:end].copy()
         for (px, py), (qx, qy) in zip(corners, (corners[1], corners[2], corners[0]), strict=True):
             within &= (qx - px) * (y - py) - (qy - py) * (x - px) >= 0

@@ -39,7 +39,8 @@ def _halved(material: Any) -> Any:
         return material
     emission = material.emission
     if isinstance(emission, Texture):
-        half: Any = emission.model_copy(update={"factor": tuple(x / 2 for x in emission.factor)})
+        numbers = {key: tuple(x / 2 for x in getattr(emission, key)) for key in ("factor", "add")}
+        half: Any = emission.model_copy(update=numbers)
     else:
         half = tuple(x / 2 for x in emission)
     return material.model_copy(update={"emission": half})

@@ -139,6 +139,28 @@ def test_a_cloud_of_one_point_is_seen(draw: Any) -> None:
         assert shown(draw({"mesh": points([place])}, film={"point_size": 4}))
 
 
+def test_a_camera_whose_axis_is_off_the_middle_sees_the_same_points(draw: Any) -> None:
+    """Its picture is the right upper quarter of a larger one, whose axis meets it at the bottom left corner."""
+    rng = np.random.default_rng(9)
+    cloud = points(rng.normal(size=(300, 3)), rng.uniform(0.1, 1, (300, 3)))
+    camera = {"eye": (0, 0, 6), "target": (0, 0, 0), "fov": 2 * np.degrees(np.arctan(32 / 64)), "near": 1, "far": 12}
+    axis = {"type": "intrinsics", "fx": 64.0, "fy": 64.0, "cx": 0.0, "cy": 32.0, "width": 32, "height": 32}
+    part = {**axis, "eye": (0, 0, 6), "target": (0, 0, 0), "near": 1, "far": 12}
+    for samples in (1, 4):
+        film = {"point_size": 3, "samples": samples}
+        whole = draw({"mesh": cloud}, size=(64, 64), camera=camera, film=film)
+        quarter = draw({"mesh": cloud}, size=(32, 32), camera=part, film=film)
+        assert (np.abs(whole[:32, 32:] - quarter).max(axis=2) > 1e-5).sum() <= 4
+
+
+@pytest.mark.parametrize("scale", [1e-25, 1e25, 1e60])
+def test_clouds_of_extreme_size_look_like_any_other(draw: Any, scale: float) -> None:
+    rng = np.random.default_rng(8)
+    cloud = points(rng.normal(size=(200, 3)), rng.uniform(0.1, 1, (200, 3)))
+    usual, extreme = (draw({"mesh": cloud, "transform": {"scale": factor}}, film={"point_size": 3}) for factor in (1, scale))
+    assert (np.abs(usual - extreme).max(axis=2) > 1e-5).sum() <= 4
+
+
 def test_several_samples_smooth_the_edges(draw: Any) -> None:
     """The samples of all pixels together see the area of the square."""
     cloud = points([(4.25, 4.75, 0.0)], [(1, 1, 1)])
@@ -209,6 +231,12 @@ def test_triangles_are_made_once_for_a_view_and_freed_for_the_next() -> None:
     assemble(first.model_copy(update={"camera": first.camera.model_copy(update={"turn": 20.0})}))
     gc.collect()
     assert freed() is None
+
+
+def test_points_behind_another_far_plane_come_back() -> None:
+    cloud = points([(4.5, 4.5, 0.0), (11.5, 4.5, -5.0)])
+    counts = [len(shown(render(scene(cloud, camera={**PIXELS, "far": far})).pixels)) for far in (12, 20, 12)]
+    assert counts == [1, 2, 1]
 
 
 def test_points_outside_the_picture_take_no_memory() -> None:

@@ -81,6 +81,13 @@ def test_a_texture_of_emission_is_decoded_like_any_colour(rate: Rate, renderer: 
     np.testing.assert_allclose(value(renderer, scene({"emission": table}), rate), expected, rtol=1e-5)
 
 
+def test_a_number_can_be_added_to_a_texture_of_emission(renderer: Renderer, grey: Path) -> None:
+    table = {"texture": grey, "encoding": "linear", "factor": -1, "add": (1, 0, 0.5)}
+    found = value(renderer, scene({"emission": table}, exposure=1.0))
+    np.testing.assert_allclose(found, 2 * np.array([1 - 188 / 255, 0, 0.5 - 64 / 255]), rtol=1e-5)
+    assert value(renderer, scene({"emission": {**table, "factor": 0}})).tolist() == [1, 0, 0.5]
+
+
 def test_a_texel_below_zero_counts_as_zero(renderer: Renderer, tmp_path: Path) -> None:
     Image(np.full((2, 2, 3), (-1, 0.5, 2), np.float32)).save(tmp_path / "t.exr")
     assert value(renderer, scene({"emission": {"texture": tmp_path / "t.exr"}})).tolist() == [0, 0.5, 2]

@@ -117,8 +117,8 @@ class TestVariants:
         choices = [(), (0,), (1,), (0, 2)] if kinds else [()]
         lights = [(*chosen, *ambient) for chosen in choices for ambient in ((), (sky,))]
         plans = {plan_instance(each, assembly, "linear") for each in instances(assembly.instances[0], brdf, picture, lights)}
-        # Textures that share a file are not counted separately. Two viewers, two encodings and the four uses of emission go with
-        # each plan, and with ambient light also the five uses of occlusion: tests/unit/glsl/test_emission_plan.py counts these.
+        # Textures that share a file are not counted separately. Two viewers, two encodings and the four uses of emission go
+        # with each plan, and with ambient light also the five uses of occlusion: test_emission_plan.py counts these.
         each_shared = {replace(each, shared=()) for each in plans}
         expected = sum(2 * 2 * 4 * (1 if each.ambient == "none" else 5) for each in each_shared)
         assert variants.valid(BRDFS[brdf], kinds) == expected

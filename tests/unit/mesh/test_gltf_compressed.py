@@ -72,13 +72,12 @@ def meshopt(fallback: bool = False, **wrong: Any) -> GltfFile:
     offset = 0
     for array, stride, mode, data in stored:
         number = file.accessor(array, normalized=array is COLOURS)
-        table = file.header["bufferViews"][number]
+        table = file.header["bufferViews"][file.header["accessors"][number]["bufferView"]]
         packed = file.header["bufferViews"][file.view(data)]
         extension = {"buffer": 0, "byteOffset": packed["byteOffset"], "byteLength": packed["byteLength"]}
         extension |= {"byteStride": stride, "count": len(array), "mode": mode, **wrong}
         table["extensions"] = {MESHOPT: extension}
-        numbers.append(len(file.header["accessors"]) - 1)
-        file.header["accessors"][-1]["bufferView"] = file.header["bufferViews"].index(table)
+        numbers.append(number)
         if not fallback:
             table |= {"buffer": 1, "byteOffset": offset}
             offset += table["byteLength"] + 4

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import glshade
+from glshade.assembly.assembly import assemble
 from glshade.errors import AssetError
 from glshade.mesh.file import load
 from glshade.mesh.mesh import Mesh
@@ -231,6 +234,27 @@ def test_tangents_of_the_file_are_kept_with_their_handedness(tmp_path: Path) -> 
     tangents = np.array([[0, 2, 0, -1], [0, 1, 1, -1], [1, 0, 0, 1]], dtype="<f4")
     mesh = only(tmp_path, file.one(file.primitive(POSITION=TRIANGLE, NORMAL=normals, TANGENT=tangents)))
     np.testing.assert_allclose(mesh.tangents, [[0, 1, 0, -1], [0, 1, 0, -1], [1, 0, 0, 1]], atol=1e-6)
+
+
+def test_both_renderers_use_the_tangents_of_the_file(tmp_path: Path) -> None:
+    """An anisotropic highlight follows them. Tangents that are turned by 90 degrees give another picture."""
+    normals = np.tile(np.array([0, 0, 1], dtype="<f4"), (4, 1))
+    pictures = []
+    for name, tangent in (("a", (1, 0, 0, 1)), ("b", (0, 1, 0, -1))):
+        file = GltfFile()
+        tangents = np.tile(np.array(tangent, dtype="<f4"), (4, 1))
+        file.one(file.primitive([0, 1, 2, 2, 1, 3], POSITION=SQUARE, NORMAL=normals, TANGENT=tangents))
+        file.write(tmp_path / f"{name}.glb")
+        material = {"brdf": "ggx", "metallic": 1.0, "roughness": 0.4, "anisotropy": 0.9}
+        film = {"size": [24, 18], "samples": 1}
+        (tmp_path / f"{name}.json").write_text(
+            json.dumps({"objects": [{"mesh": f"{name}.glb", "material": material}], "film": film})
+        )
+        scene = glshade.load(tmp_path / f"{name}.json")
+        np.testing.assert_array_equal(assemble(scene).instances[0].mesh.tangents, tangents)
+        assert glshade.verify(scene).exit_code == 0
+        pictures.append(np.asarray(glshade.reference.render(scene).pixels))
+    assert np.abs(pictures[0] - pictures[1]).max() > 0.05
 
 
 # --- morph targets ---------------------------------------------------------------------------------------------------

@@ -106,6 +106,16 @@ def test_instances_of_a_node(tmp_path: Path) -> None:
         parts(tmp_path, file)
 
 
+def test_more_instances_than_a_picture_may_have_are_refused_before_they_are_made(tmp_path: Path) -> None:
+    """The accessor needs no bytes, so that a tiny file may ask for millions of copies."""
+    file = GltfFile()
+    table = {"componentType": 5126, "count": 5_000_000, "type": "VEC3"}
+    attributes = {"TRANSLATION": file.table(table)}
+    file.header["nodes"] = [{"mesh": 0, "extensions": {"EXT_mesh_gpu_instancing": {"attributes": attributes}}}]
+    with pytest.raises(AssetError, match="draws 5,000,000 copies of a mesh; 100,000 are allowed"):
+        parts(tmp_path, file.one(file.primitive(POSITION=TRIANGLE)))
+
+
 def test_extensions_that_are_needed_or_used(tmp_path: Path) -> None:
     needed = tree([{"mesh": 0}], extensionsRequired=["VENDOR_voxels", "KHR_mesh_quantization"])
     with pytest.raises(AssetError, match="needs the glTF extension VENDOR_voxels, which glshade does not read"):

@@ -112,6 +112,12 @@ def test_a_file_gets_one_warning_that_counts_the_triangles_of_all_its_parts(tmp_
     assert [len(part.mesh.triangles) for part in model.parts] == [1, 1, 1]
 
 
+def test_a_file_of_triangles_without_area_says_so(tmp_path: Path) -> None:
+    path = ply(tmp_path / "line.ply", np.outer(np.arange(3), [1.0, 2.0, 3.0]), np.array([[0, 1, 2], [0, 0, 1]]))
+    with pytest.warns(AssetWarning, match="none of its 2 triangles has an area, so they are not visible"):
+        load(path)
+
+
 def test_uvs_and_colours_that_are_not_finite_are_replaced_and_counted() -> None:
     uvs = CORNERS[:, :2].copy()
     uvs[1] = np.nan, 0.5

@@ -71,5 +71,5 @@ def test_a_new_format_is_one_new_file(copy: Path, tmp_path: Path, glshade: Any) 
 
 def test_suffixes_are_known_without_an_import_of_the_readers(python: Any) -> None:
     loaded = python("import sys; from glshade.mesh.file import SUFFIXES; print(*SUFFIXES); print(*sys.modules)").split("\n")
-    assert loaded[0] == ".glb .gltf .obj .off .ply .stl"
+    assert loaded[0] == ".3mf .dae .glb .gltf .obj .off .ply .stl"
     assert [name for name in loaded[1].split() if name.startswith("glshade.mesh.formats")] == ["glshade.mesh.formats"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from support.mesh_contents import area, colours, corners, mesh_of, places, read_mesh
+from support.mesh_contents import area, colours, complaint, corners, mesh_of, places, read_mesh
 
 from glshade.errors import AssetError
 from glshade.mesh.reading.contents import Contents
@@ -150,14 +150,11 @@ def test_a_bad_file_says_what_is_wrong_and_where(data: bytes | str, message: str
 
 
 @given(st.integers(0, 1 << 30), st.integers(0, 255), st.booleans())
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_a_changed_byte_gives_a_mesh_or_one_line(position: int, value: int, one_a_line: bool) -> None:
     text = f"CNOFF\n4 2 0\n{SQUARE}4 0 1 2 3 255 0 0\n3 0 1 2\n".replace(" 0\n", " 0 0 0 1 0.5 0.5 0.5 1\n", 1)
     text = text.replace(" 0\n", " 0 0 0 1 0.5 0.5 0.5 1\n").replace("4 2 0 0 0 1 0.5 0.5 0.5 1", "4 2 0")
     data = bytearray((text.replace(" ", "\n") if one_a_line else text).encode())
     data[position % len(data)] = value
     for mutated in (bytes(data), bytes(data[: position % len(data)])):
-        try:
-            assert contents(mutated).parts
-        except AssetError as error:
-            assert "not a readable OFF file (" not in str(error)
+        assert "do not fit together" not in complaint("a.off", mutated)

@@ -104,7 +104,7 @@ def fault(**keys: Any) -> tuple[str, str]:
         ({"objects": []}, "objects", "is empty: there is nothing to draw"),
         ({"objects": "sphere"}, "objects", "must be a list, not 'sphere'"),
         ({"objects": [3]}, "objects.0", "must be a table, not 3"),
-        ({"objects": [{}]}, "objects.0", "needs a mesh or a shape, and not both"),
+        ({"objects": [{}]}, "objects.0", "needs a mesh or a shape: no object names it as its parent"),
         ({"objects": [{"shape": "spere"}]}, "objects.0.shape", "unknown type 'spere'; did you mean \"sphere\"?"),
         ({"objects": [{"shape": {"type": "torus", "minor": 1}}]}, "objects.0.shape.minor", "must be less than 1, not 1"),
         ({"objects": [{**SPHERE, "material": "glod"}]}, "objects.0.material", 'no material or preset is named "glod"; did you'),

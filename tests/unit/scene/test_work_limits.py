@@ -132,13 +132,15 @@ def test_a_long_chain_of_nodes(tmp_path: Path) -> None:
         "nodes": [*nodes, {"mesh": 0}],
     }
     (tmp_path / "m.gltf").write_text(json.dumps(document))
-    assert len(mesh_file.load(tmp_path / "m.gltf").parts) == 1
+    # An accessor without bytes holds zeros, so that the only triangle is a point.
+    with pytest.warns(UserWarning, match="has an area"):
+        assert len(mesh_file.load(tmp_path / "m.gltf").parts) == 1
 
 
 def test_a_polygon_with_many_corners(tmp_path: Path) -> None:
-    corners = "".join(f"v {k} {k % 2 * 5 + k * k * 1e-6} 0\n" for k in range(5000))
-    (tmp_path / "m.obj").write_text(f"{corners}f {' '.join(str(k + 1) for k in range(5000))}\n")
-    with pytest.raises(SceneError, match="5,000 corners"):
+    corners = "".join(f"v {k} {k % 2 * 5 + k * k * 1e-6} 0\n" for k in range(10_002))
+    (tmp_path / "m.obj").write_text(f"{corners}f {' '.join(str(k + 1) for k in range(10_002))}\n")
+    with pytest.raises(SceneError, match="10,002 corners"):
         load(tmp_path / "m.obj")
 
 

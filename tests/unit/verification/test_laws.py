@@ -19,7 +19,7 @@ from glshade.assembly import assembly
 from glshade.assembly.instance import Instance
 from glshade.gl import renderer as gl_renderer
 from glshade.lights import Placed, directional
-from glshade.mesh import normals
+from glshade.mesh import fans
 from glshade.radiance import draw as radiance_draw
 from glshade.radiance.sampler import Sampler
 from glshade.reference.inputs import Inputs
@@ -245,7 +245,7 @@ def parents_flattened(patch: pytest.MonkeyPatch) -> None:
             parent = placed[parent][1]
         return placed[parent][0] @ own
 
-    patch.setattr(assembly, "_world", world)
+    patch.setattr(assembly, "world_of", world)
 
 
 def rotations(patch: pytest.MonkeyPatch) -> None:
@@ -265,17 +265,17 @@ def rotations(patch: pytest.MonkeyPatch) -> None:
 def triangles_reordered(patch: pytest.MonkeyPatch) -> None:
     """A smooth normal is that of the first triangle at the vertex."""
 
-    def first(mesh: Any, label: Any, count: int) -> Any:
+    def first(mesh: Any, label: Any, count: int, faces: Any) -> Any:
         found = np.zeros((count, 3))
-        found[label[::-1]] = np.repeat(normals.face_normals(mesh), 3, axis=0)[::-1]
+        found[label[::-1]] = np.repeat(faces, 3, axis=0)[::-1]
         return found
 
-    patch.setattr(normals, "smooth_by_label", first)
+    patch.setattr(fans, "smooth_by_label", first)
 
 
 def unwelded(patch: pytest.MonkeyPatch) -> None:
     """Normals are smooth only between triangles that share vertices."""
-    patch.setattr(normals, "weld", lambda *columns: np.arange(len(columns[0])))
+    patch.setattr(fans, "weld", lambda *columns: np.arange(len(columns[0])))
 
 
 def baked(patch: pytest.MonkeyPatch) -> None:

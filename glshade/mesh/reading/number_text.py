@@ -1,4 +1,4 @@
-"""Numbers: parses text that consists of numbers with spaces and line ends between them."""
+"""Number text: parses text that consists of numbers with spaces and line ends between them."""
 
 from __future__ import annotations
 
@@ -34,6 +34,8 @@ def _up_to_the_first_error(text: bytes, first_line: int) -> tuple[Float64, str]:
             except ValueError:
                 # Microsoft's C library writes NaN as "-1.#IND" or "-nan(ind)", and infinity as "1.#INF".
                 if b"#" not in word and b"nan" not in word.lower():
-                    return np.array(values), f"line {number}: '{printable(word[:40].decode('latin-1'))}' is not a number"
+                    return np.array(
+                        values
+                    ), f"line {number}: '{printable(word[:40].decode('ascii', 'backslashreplace'))}' is not a number"
                 values.append(math.nan)
     return np.array(values), ""
