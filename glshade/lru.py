@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from threading import RLock
 from typing import Generic, TypeVar
 from weakref import WeakValueDictionary
 
@@ -24,26 +25,30 @@ class Lru(Generic[Key, Value]):
         # The keys whose values have not been used since the last call of `age`.
         self._unused: set[Key] = set()
         self.size = 0
+        # Several threads may share a cache. The lock is held while its tables change, and not while a value is made.
+        self._lock = RLock()
 
     def __len__(self) -> int:
         return len(self._kept)
 
     def get(self, key: Key) -> Value | None:
         """Returns the value of a key, which now counts as the most recently used; None if the key has no value."""
-        found = self._kept.get(key)
-        if found is None:
-            return None
-        self._kept.move_to_end(key)
-        self._unused.discard(key)
-        return found[0]
+        with self._lock:
+            found = self._kept.get(key)
+            if found is None:
+                return None
+            self._kept.move_to_end(key)
+            self._unused.discard(key)
+            return found[0]
 
     def put(self, key: Key, value: Value, size: int) -> Value:
         """Stores a value of a size [bytes], in place of the key's old value. Evicts others if need be. Returns the value."""
-        self.drop(key)
-        self._kept[key] = value, size
-        self.size += size
-        while len(self._kept) > self.spare and (self.size > self.limit or len(self._kept) > (self.most or len(self._kept))):
-            self.drop(next(iter(self._kept)))
+        with self._lock:
+            self.drop(key)
+            self._kept[key] = value, size
+            self.size += size
+            while len(self._kept) > self.spare and (self.size > self.limit or len(self._kept) > (self.most or len(self._kept))):
+                self.drop(next(iter(self._kept)))
         return value
 
     def find(self, key: Key, make: Callable[[], Value], size: Callable[[Value], int]) -> Value:
@@ -56,14 +61,16 @@ class Lru(Generic[Key, Value]):
 
     def drop(self, key: Key) -> None:
         """Removes a key and its value, if the key has one."""
-        found = self._kept.pop(key, None)
-        self._unused.discard(key)
-        if found is not None:
-            self.size -= found[1]
+        with self._lock:
+            found = self._kept.pop(key, None)
+            self._unused.discard(key)
+            if found is not None:
+                self.size -= found[1]
 
     def age(self) -> None:
         """Marks all values as unused. A value that is looked up or stored afterwards counts as used again."""
-        self._unused = set(self._kept)
+        with self._lock:
+            self._unused = set(self._kept)
 
     def evict_unused(self) -> None:
         """Evicts the values that have not been used since the last call of `age`."""
@@ -72,9 +79,10 @@ class Lru(Generic[Key, Value]):
 
     def clear(self) -> None:
         """Removes all values."""
-        self._kept.clear()
-        self._unused.clear()
-        self.size = 0
+        with self._lock:
+            self._kept.clear()
+            self._unused.clear()
+            self.size = 0
 
 
 class WeakLru(Lru[Key, Value]):

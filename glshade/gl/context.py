@@ -11,6 +11,7 @@ import ctypes
 import os
 import re
 import sys
+import weakref
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
@@ -19,7 +20,8 @@ import glcontext
 import moderngl
 
 from glshade.errors import ContextError
-from glshade.gl.mesa_cache import reserve_index
+from glshade.gl.egl import ADVICE, LIBEGL, EglCurrency, load_egl
+from glshade.gl.exclusive import Exclusive, note_driver
 
 if TYPE_CHECKING:
     from glshade.gl.linker import Linker
@@ -28,7 +30,6 @@ Backend = Literal["auto", "egl", "osmesa", "standalone"]
 # What moderngl raises where OpenGL refuses a call, for modules outside of this room.
 DriverFault: type[Exception] = moderngl.Error
 BACKENDS: tuple[Backend, ...] = ("auto", "egl", "osmesa", "standalone")
-LIBEGL = "libEGL.so.1"
 # OpenGL 3.3, in moderngl's notation.
 REQUIRED_VERSION = 330
 
@@ -46,8 +47,6 @@ CHOOSING = ("GALLIUM_DRIVER", "MESA_LOADER_DRIVER_OVERRIDE", "LIBGL_DRIVERS_PATH
 # llvmpipe's GL_RENDERER string ends with the width of its vectors. Mesa 22.3 crashes when it draws with another width than
 # these, which only the environment variable LP_NATIVE_VECTOR_WIDTH can ask for [bits].
 WIDTH, WIDTHS = re.compile(r"llvmpipe.* (\d+) bits"), ("128", "256")
-
-ADVICE = "install a driver (Debian, Ubuntu: apt install libegl1 libgl1-mesa-dri), then see `glshade doctor`"
 
 
 @dataclass(frozen=True)
@@ -84,14 +83,20 @@ class Context:
     """
 
     def __init__(
-        self, gl: moderngl.Context, backend: str, procedure: Callable[[str], int | None], linker: Linker | None = None
+        self,
+        gl: moderngl.Context,
+        backend: str,
+        procedure: Callable[[str], int | None],
+        linker: Linker | None = None,
+        window: Exclusive | None = None,
     ) -> None:
         self._gl, self.backend, self.linker = gl, backend, linker
-        self._procedure = procedure
+        self._procedure, self._window = procedure, window
         # Only gc() deletes the GL objects that Python no longer uses, and it runs while this context is current. In another
         # context the same number may name an object that is in use.
         gl.gc_mode = "context_gc"
-        self._released = False
+        # A context that is forgotten is destroyed like one that is released.
+        self._release = weakref.finalize(self, _destroy, gl, linker)
         # The info is read now, while the context is current. Later it may be empty, and moderngl would cache the empty info.
         self._info = gl.info
         clip_control = self.procedure("glClipControl", None, ctypes.c_uint, ctypes.c_uint)
@@ -107,7 +112,7 @@ class Context:
 
     def check_open(self) -> None:
         """Checks that the context may be used. Errors: ContextError after `release`."""
-        if self._released:
+        if not self._release.alive:
             raise ContextError("the OpenGL context, or the Renderer that had it, has been released: make a new one")
 
     @property
@@ -146,11 +151,23 @@ class Context:
         address = self._procedure(name)
         return ctypes.CFUNCTYPE(result, *arguments)(address) if address else None
 
+    def leave(self) -> None:
+        """Makes no context current in this thread, so that any thread may enter this one."""
+        if self._window is not None:
+            self._window.leave()
+
     def release(self) -> None:
         """Destroys the context and all of its objects. A second call does nothing."""
-        if not self._released:
-            self._released = True
-            self._gl.release()
+        self._release()
+
+
+def _destroy(gl: moderngl.Context, linker: Linker | None) -> None:
+    """Destroys a context and all of its objects."""
+    # moderngl does not free the set of the extensions' names, nor the linker.
+    gl.extensions.clear()
+    if linker is not None:
+        linker.forget()
+    gl.release()
 
 
 def open_context(backend: Backend = "auto", device: int | None = None, program_cache: bool | None = None) -> Context:
@@ -194,7 +211,8 @@ def _open_egl(device: int | None, cached: bool) -> Context:
         options["device_index"] = device
     try:
         window = glcontext.get_backend_by_name("egl")(**options)
-        gl, linker = _wrapped(window, "egl", cached)
+        exclusive = Exclusive(window, EglCurrency())
+        gl, linker = _wrapped(exclusive, "egl", cached)
     except Exception as error:
         if device is not None:
             count = len(devices())
@@ -210,7 +228,7 @@ def _open_egl(device: int | None, cached: bool) -> Context:
         address: int | None = egl.eglGetProcAddress(name.encode())
         return address
 
-    return _checked(Context(gl, "egl", procedure, linker))
+    return _checked(Context(gl, "egl", procedure, linker, exclusive))
 
 
 def _open_osmesa(cached: bool, instead_of: ContextError | None = None) -> Context:
@@ -224,20 +242,22 @@ def _open_osmesa(cached: bool, instead_of: ContextError | None = None) -> Contex
         raise instead_of or ContextError("this process has used EGL already; OSMesa needs a process of its own")
     from glshade.gl.osmesa import OSMesa, check_driver
 
+    note_driver()
     try:
         check_driver()
         own = OSMesa(REQUIRED_VERSION)
+        exclusive = Exclusive(own, own)
     except ContextError as error:
         raise instead_of or error from None
     try:
-        gl, linker = _wrapped(own, "osmesa", cached)
+        gl, linker = _wrapped(exclusive, "osmesa", cached)
     except Exception as error:
         raise ContextError(f"OSMesa gives no OpenGL {REQUIRED_VERSION / 100:.1f} context ({error})") from None
     _opened.add("osmesa")
-    return _checked(Context(gl, "osmesa", own.load_opengl_function, linker))
+    return _checked(Context(gl, "osmesa", own.load_opengl_function, linker, exclusive))
 
 
-def _wrapped(window: Any, backend: str, cached: bool) -> tuple[moderngl.Context, Linker | None]:
+def _wrapped(window: Exclusive, backend: str, cached: bool) -> tuple[moderngl.Context, Linker | None]:
     """Returns a moderngl context around a context of glcontext or OSMesa, and the linker between them, or None without a
     linker.
     """
@@ -260,15 +280,6 @@ def _checked(context: Context) -> Context:
         context.release()
         raise ContextError(f"llvmpipe crashes with vectors of {width[1]} bits: set LP_NATIVE_VECTOR_WIDTH to 128 or 256")
     return context
-
-
-def load_egl() -> ctypes.CDLL:
-    """Returns the EGL library. Errors: ContextError if it is missing."""
-    reserve_index()
-    try:
-        return ctypes.CDLL(LIBEGL)
-    except OSError as error:
-        raise ContextError(f"{LIBEGL} cannot be loaded ({error}); {ADVICE}") from None
 
 
 def devices() -> list[Device]:

@@ -103,6 +103,11 @@ class Linker:
         """Destroys the context."""
         self._window.release()
 
+    def forget(self) -> None:
+        """Frees everything but the context object, which must not be used afterwards except to release it."""
+        self._gl.clear()
+        self._own.clear()
+
     def program(self, gl: moderngl.Context, vertex: str, fragment: str | None) -> moderngl.Program:
         """Returns the linked program of two texts, from the disk cache if it is there; else it is compiled and added to the
         cache.

@@ -9,8 +9,8 @@ import ctypes
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
-from typing import Any
 
 from glshade.errors import ContextError
 from glshade.gl.mesa_cache import reserve_index
@@ -47,6 +47,10 @@ def load() -> ctypes.CDLL:
     raise ContextError(f"{LIBRARIES[0]} cannot be loaded; apt install libosmesa6 (Mesa 25.1 and later have none)")
 
 
+# The context of OSMesa that is current in each thread.
+_current = threading.local()
+
+
 class OSMesa:
     """One OSMesa context. OSMesa needs a colour buffer, so it gets one of a single pixel; glshade draws into textures."""
 
@@ -78,6 +82,7 @@ class OSMesa:
             raise ContextError(f"OSMesa gives no OpenGL {version / 100:.1f} context")
 
     def _make_current(self) -> bool:
+        _current.context = self
         return bool(self._library.OSMesaMakeCurrent(self._context, self._buffer, GL_UNSIGNED_BYTE, 1, 1))
 
     def load_opengl_function(self, name: str) -> int:
@@ -87,9 +92,17 @@ class OSMesa:
     def __enter__(self) -> None:
         self._make_current()
 
-    def __exit__(self, *unused: Any) -> None:
-        # The context may stay current, because every context is entered before it is used.
-        pass
+    def current(self) -> OSMesa | None:
+        """Returns the context that is current in this thread, if it is one of this class."""
+        return _current.__dict__.get("context")
+
+    def restore(self, current: OSMesa | None) -> None:
+        """Makes a context current again, or none."""
+        if current is not None:
+            current._make_current()
+        else:
+            self._library.OSMesaMakeCurrent(None, None, 0, 0, 0)
+            _current.context = None
 
     def release(self) -> None:
         """Destroys the context."""

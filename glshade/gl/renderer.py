@@ -78,6 +78,8 @@ class Renderer:
         self.resources = Resources(self.context)
         self._preparer = Preparer(self.resources)
         self._prepared: Lru[tuple[Any, ...], Prepared] = Lru(SCENES_SIZE, most=SCENES)
+        # A context is current in one thread at most. Whoever draws enters it.
+        self.context.leave()
 
     def __enter__(self) -> Renderer:
         return self
