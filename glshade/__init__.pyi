@@ -1,6 +1,8 @@
 """The public names of glshade, each with the module that holds it. `__init__.py` reads this list at the first use of a name."""
 
 from glshade import reference as reference
+from glshade.batch.engine import Outcome as Outcome
+from glshade.batch.from_python import render_all as render_all
 from glshade.brdfs import BRDFS as BRDFS
 from glshade.debug.pixels import PixelTrace as PixelTrace
 from glshade.debug.pixels import trace_pixel as trace_pixel

@@ -11,6 +11,8 @@ from dataclasses import dataclass
 # The sizes of files [bytes]. A larger file of its kind is refused before it is read.
 # A scene of 16 MiB has a quarter of a million objects; Python's parser of TOML takes half a minute for it.
 LARGEST_SCENE = 16 << 20
+# The cameras of 300,000 pictures. The points that COLMAP lists with its pictures need most of the file, too.
+LARGEST_CAMERAS = 256 << 20
 # The largest file that ships with glshade has 8 kB.
 LARGEST_SHADER = 1 << 20
 # A mesh file is read as a whole into memory.

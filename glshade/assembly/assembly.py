@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -32,7 +32,7 @@ from glshade.mesh.mesh import Mesh
 from glshade.mesh.model import MeshPart, Model
 from glshade.mesh.normals import with_normals
 from glshade.mesh.order import ordered
-from glshade.mesh.reading.textures import plain
+from glshade.mesh.reading.textures import plain, unplaced
 from glshade.mesh.tangents import OWN_AXES, Axes, with_tangents
 from glshade.mesh.winding import turned_over
 from glshade.scene.camera import View, calibration_of
@@ -67,6 +67,8 @@ class Assembly:
     objects: name of an object -> transform (4, 4) to world space [scene units].
     unit: the factor of all lengths. It differs from 1 only if the squares of lengths would leave the range of float32.
     own_light: index of the light that shows the base colours of unlit materials; None if no material is unlit.
+    pieces: what the instances were made of, so that `seen_anew` need not look it up again.
+    boxes: the corners (N, 8, 3) of boxes round the pieces, in world space [scene units].
     """
 
     instances: tuple[Instance, ...]
@@ -75,6 +77,8 @@ class Assembly:
     objects: Mapping[str, Array] = field(default_factory=dict)
     unit: float = 1.0
     own_light: int | None = None
+    pieces: tuple[_Piece, ...] = ()
+    boxes: Array = field(default_factory=lambda: np.zeros((0, 8, 3)))
 
     def calibration(self, scene: Scene) -> Calibration:
         """Returns how the picture of a scene is seen: the pixels of its window, the camera's pose, and those of its objects.
@@ -138,7 +142,8 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
     """
     pieces, objects = _pieces(scene, shading)
     check_texels((piece.material for piece in pieces), scene.limits)
-    view = _view(scene, pieces)
+    boxes = np.stack([piece.box for piece in pieces])
+    view = _view(scene, pieces, boxes)
     own = file_lights(scene, scene.loader())
     # The lights of mesh files replace the default rig, and join the lights that the scene lists.
     lights = (*(scene.lights or ()), *own) if own or scene.lights is not None else rig(view)
@@ -150,8 +155,48 @@ def assemble(scene: Scene, shading: Rate | None = None) -> Assembly:
         raise SceneError(problems)
     unlit = any(len(lights) in instance.lights for instance in instances)
     shown = (*lights, WHITE) if unlit else tuple(lights)
-    assembly = Assembly(instances, shown, view, objects, own_light=len(lights) if unlit else None)
-    return _in_range(assembly, np.concatenate([piece.box for piece in pieces]))
+    own_light = len(lights) if unlit else None
+    assembly = Assembly(instances, shown, view, objects, own_light=own_light, pieces=tuple(pieces), boxes=boxes)
+    return _in_range(assembly, boxes.reshape(-1, 3))
+
+
+def seen_anew(before: Assembly, scene: Scene) -> Assembly | None:
+    """Returns the assembly of a scene that differs from another one in its camera alone. It shares all instances with it.
+
+    before: the assembly of the other scene, without refined meshes.
+    scene: the scene, whose objects, materials, lights, quality and film are those of the other.
+
+    The result is None where more than the view and the default lights depends on the camera, or where a mesh file has changed.
+    """
+    pieces, corners, load = before.pieces, before.boxes, scene.loader()
+    models = {piece.item.mesh: piece.source for piece in pieces if isinstance(piece.item.mesh, Path)}
+    if any(load(path) is not model for path, model in models.items()):
+        return None
+    if any(piece.mesh.strokes is not None or piece.item.file_lights for piece in pieces):
+        return None
+    view = _view(scene, pieces, corners)
+    lights = rig(view) if scene.lights is None else scene.lights
+    shown = (*lights, WHITE) if before.own_light is not None else tuple(lights)
+    if _alike(shown) != _alike(before.lights) or before.unit != 1 or _unit(corners.reshape(-1, 3), view) != 1:
+        return None
+    # A near plane that cuts a solid open shows its inside.
+    for number in np.flatnonzero(_may_cut(before.view, corners) | _may_cut(view, corners)):
+        instance = before.instances[number]
+        if instance.back_faces != _draws_back_faces(pieces[number], instance.material, view):
+            return None
+    return replace(before, view=view, lights=shown)
+
+
+def _alike(lights: tuple[Light, ...]) -> list[dict[str, Any]]:
+    """Returns what decides which instances lights reach, and by which programs: all but their places."""
+    return [light.model_dump(exclude={"position", "direction"}) for light in lights]
+
+
+def _may_cut(view: View, corners: Array) -> NDArray[np.bool_]:
+    """Returns for boxes, given by their corners (N, 8, 3), whether the near plane may cut them (N,)."""
+    # The margin is far above the rounding of the depths, which are computed in another order for one box.
+    margin = 1e-9 * float(np.abs(corners - view.eye).max())
+    return np.asarray(view.depth(corners).min(axis=1) <= view.near + margin)
 
 
 def _pieces(scene: Scene, shading: Rate | None) -> tuple[list[_Piece], dict[str, Array]]:
@@ -182,12 +227,12 @@ def _pieces(scene: Scene, shading: Rate | None) -> tuple[list[_Piece], dict[str,
     return pieces, objects
 
 
-def _view(scene: Scene, pieces: list[_Piece]) -> View:
-    """Returns the scene's camera at its final position."""
+def _view(scene: Scene, pieces: Sequence[_Piece], boxes: Array) -> View:
+    """Returns the scene's camera at its final position. boxes: the corners (N, 8, 3) of boxes round the pieces."""
     width, height = scene.film.size
     exactly = scene.camera.framing and sum(len(piece.mesh.positions) for piece in pieces) <= FRAMED_EXACTLY
-    points = [piece.points() if exactly else piece.box for piece in pieces]
-    return scene.camera.view(np.concatenate(points), width / height)
+    points = np.concatenate([piece.points() for piece in pieces]) if exactly else boxes.reshape(-1, 3)
+    return scene.camera.view(points, width / height)
 
 
 def _instance(scene: Scene, piece: _Piece, view: View, lights: tuple[Light, ...], shading: Rate | None) -> Instance:
@@ -364,8 +409,7 @@ def _file_material(part: MeshPart, path: Path) -> Brdf:
         return DEFAULT_MATERIAL
     given = plain(part.material) if part.mesh.uvs is None else part.material
     if given is not part.material:
-        message = f"{path}: {part.name} has no texture coordinates; drawn without the textures of its material"
-        warnings.warn(message, AssetWarning, stacklevel=2)
+        warnings.warn(f"{path}: {unplaced(part.name)}", AssetWarning, stacklevel=2)
     try:
         if part not in _file_materials:
             _file_materials[part] = BRDFS[given["brdf"]].model_validate(given)

@@ -12,6 +12,19 @@ from glshade.batch.task import Task
 from glshade.calibration import file as camera_file
 from glshade.calibration.calibration import CAMERA, CalibratedPicture, Calibration
 from glshade.image import file as picture_file
+XX
+
+
+def check(path: Path, name: str, scenes: Mapping[str, Scene]) -> None:
+    """Refuses, before pictures are drawn, a place where cameras cannot be written, and a format that cannot hold them.
+
+    path, name: as for `write`.
+    scenes: path of a picture -> its scene, for the pictures whose scenes are known already.
+    Errors: GlshadeError.
+    """
+    flat = (output for output, scene in scenes.items() if not scene.camera.perspective)
+    camera_file.check_kind(path, name, next(flat, None))
+    camera_file.check_place(path, name)
 
 
 def write(path: Path, name: str, tasks: Sequence[Task], calibrations: Mapping[int, Mapping[str, Any]]) -> list[str]:

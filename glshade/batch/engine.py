@@ -35,6 +35,7 @@ class Outcome:
     seconds_pictures: time from the start of the first picture's drawing until the last file was closed [s]
     codes: exit codes of the failed pictures
     seen: number of a picture -> how it was seen, for the pictures that were drawn
+    instances: number of a picture -> the objects that it shows, for the pictures that were drawn with `Task.instances`
     """
 
     pictures: int
@@ -45,6 +46,7 @@ class Outcome:
     seconds_pictures: float = 0.0
     codes: set[int] = field(default_factory=set)
     seen: dict[int, Mapping[str, Any]] = field(default_factory=dict)
+    instances: dict[int, Mapping[str, Any]] = field(default_factory=dict)
 
     @property
     def left(self) -> int:

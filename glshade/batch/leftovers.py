@@ -16,11 +16,12 @@ NUMBER = re.compile(r"\.(\d+)(?=\.\w+$)")
 def remove(outputs: Iterable[str | Path]) -> None:
     """Removes temporary files beside these picture files, if their processes have ended. Each folder is listed only once."""
     # This import is late, because it imports NumPy. A pool starts its workers before the slow import of NumPy.
-    from glshade.image.layers import layers_path
+    from glshade.image.layers import PNG_AOVS, layer_files, layers_path
 
     folders: dict[Path, set[str]] = {}
     for output in map(Path, outputs):
-        folders.setdefault(output.parent, set()).update((output.name, layers_path(output).name))
+        names = folders.setdefault(output.parent, set())
+        names.update((output.name, layers_path(output).name, *(file.name for file in layer_files(output, PNG_AOVS, "png"))))
     for folder, names in folders.items():
         try:
             hidden = [name for name in os.listdir(folder) if name.startswith(".")]

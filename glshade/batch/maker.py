@@ -130,10 +130,20 @@ class Maker:
         picture = self._picture(task, scene)
         seconds = {"load": loaded - start, "draw": perf_counter() - loaded}
         # The digest in a file's header says nothing about the rest of the file. So the file is compared with the new picture.
-        compared = task.resume and all(digest_of(file) == name for file in files)
+        compared = task.resume and all(digest_of(file) == name for file in files if file.suffix != ".json")
         image = picture if isinstance(picture, Image) else picture.image
         seen = json.loads(image.calibration.json()) if image.calibration else {}
-        return Drawn(picture, files, replace(record, seconds=seconds, started=started, seen=seen), compared)
+        shown = self._instances(task, scene) if task.instances else {}
+        record = replace(record, seconds=seconds, started=started, seen=seen, instances=shown)
+        return Drawn(picture, files, record, compared)
+
+    def _instances(self, task: Task, scene: Scene) -> dict[str, Any]:
+        """Returns the objects that a picture shows. Errors: SceneError."""
+        from glshade.batch.coco import instances
+
+        if task.reference:
+            raise SceneError(f"{task.scene}: the reference draws the picture alone, without masks of objects")
+        return instances(scene, self.renderer.surfaces(scene)[1])
 
     def _picture(self, task: Task, scene: Scene) -> Image | Layers:
         linear = format_of(task.output).floats
@@ -173,7 +183,7 @@ class Drawn:
     """A picture that is drawn and not yet written.
 
     picture: the pixels, with layers if the film asks for them
-    files: the picture's file and, if there is one, the separate file of its layers
+    files: the picture's file and the separate files of its layers
     record: the record of the picture, complete except for the fields about the file
     compared: True if files that hold the same bytes already are left alone; the record then says "skipped"
     warnings: messages of the warnings raised while it was drawn
@@ -238,13 +248,13 @@ def _changed(scene: Scene, task: Task) -> Scene:
 
 
 def _files(task: Task, scene: Scene) -> list[Path]:
-    """Returns the files that a task writes: the picture, and a file of layers if the picture's format cannot hold them."""
+    """Returns the files that a task writes: the picture, and the files of layers that lie beside it."""
     output = Path(task.output)
-    if not scene.film.aovs or format_of(output).layers:
+    if not scene.film.aovs:
         return [output]
-    from glshade.image.layers import layers_path
+    from glshade.image.layers import layer_files
 
-    return [output, layers_path(output)]
+    return [output, *layer_files(output, scene.film.aovs, scene.film.aov_format)]
 
 
 def _failed(task: Task, error: BaseException) -> Record:

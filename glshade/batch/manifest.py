@@ -26,14 +26,19 @@ class NoManifest(GlshadeError):
 class Manifest:
     """The log file, open for appending. This class is a context manager.
 
+    path: the file; it is made if it is not there.
+    instances: True to keep what the lines tell about the objects in the pictures.
+
     Errors: GlshadeError if the file cannot be read or written; NoManifest if it holds something else than a manifest.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, instances: bool = False) -> None:
         self.path = path
         self._folder = path.resolve().parent
         # Output path -> `Task.known`, for pictures that are done according to their last line.
         self._done: dict[str, tuple[str, ...]] = {}
+        # Output path -> `Record.instances`; None where nobody asks for them, because masks take much memory.
+        self._instances: dict[str, dict[str, Any]] | None = {} if instances else None
         try:
             self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_CLOEXEC", 0), 0o666)
         except OSError as error:
@@ -57,14 +62,20 @@ class Manifest:
         """Returns the `Task.known` of a picture; empty if its last line does not say that it is done, or if it has no line."""
         return self._done.get(self._relative(output), ())
 
+    def instances(self, output: str) -> dict[str, Any]:
+        """Returns the objects that a finished picture shows; empty if the log does not tell them, or is not asked to."""
+        name = self._relative(output)
+        return (self._instances or {}).get(name, {}) if name in self._done else {}
+
     def add(self, task: Task, record: Record) -> None:
         """Appends a line for the record.
 
-        A skipped picture gets no line if the log says already that it is done. That line is missing if the process was killed
-        before it wrote the line; the line is then written now.
+        A skipped picture gets no line if the log says already that it is done and, if asked, which objects it shows. That line
+        is missing if the process was killed before it wrote the line; the line is then written now.
         Errors: GlshadeError if the line cannot be written, as on a full disk.
         """
-        if record.state == "skipped" and (not record.digest or self.known(record.output) == record.known):
+        told = not record.instances or bool(self.instances(record.output))
+        if record.state == "skipped" and (not record.digest or (self.known(record.output) == record.known and told)):
             return
         line: dict[str, Any] = {
             "output": self._relative(record.output),
@@ -111,6 +122,8 @@ class Manifest:
         if line.get("state") == "done":
             texts = (line.get(key) for key in ("digest", "sha256", "layers_sha256"))
             self._done[output] = tuple(text for text in texts if isinstance(text, str) and text)
+            if self._instances is not None and isinstance(line.get("instances"), dict):
+                self._instances[output] = line["instances"]
         else:
             self._done.pop(output, None)
 

@@ -31,8 +31,9 @@ class Record:
     exit_code: exit code that belongs to the failure, as docs/exit-codes.md lists them
     stops: True if the next pictures would fail for the same reason, such as a full disk or a folder without write permission
     warnings: messages of the warnings raised while the picture was made
-    layers_sha256: SHA-256 of the separate file of layers; "" if the picture has none
+    layers_sha256: SHA-256 of each separate file of layers, one after the other; "" if the picture has none
     seen: how the picture was seen, as `Calibration.as_dict`; empty if it was not drawn
+    instances: the objects that the picture shows, as `coco.instances` returns them; empty if the task does not ask for them
     sample: the values that were drawn at random, by their dotted keys
     """
 
@@ -54,6 +55,7 @@ class Record:
     warnings: tuple[str, ...] = ()
     layers_sha256: str = ""
     seen: Mapping[str, Any] = field(default_factory=dict)
+    instances: Mapping[str, Any] = field(default_factory=dict)
     sample: Mapping[str, Any] = field(default_factory=dict)
 
     @property

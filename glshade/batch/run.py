@@ -46,6 +46,8 @@ def run_batch(
             setattr(outcome, record.state, getattr(outcome, record.state) + 1)
             if record.seen:
                 outcome.seen[record.number] = record.seen
+            if record.instances:
+                outcome.instances[record.number] = record.instances
             if record.state == "failed":
                 outcome.codes.add(record.exit_code)
             if record.state == "done" and record.started:

@@ -25,6 +25,7 @@ class Task:
     tile: largest side of a region that is drawn in one piece [pixels]; None leaves it to the renderer
     settings: `Setting.as_dict` of each object, as --budget or --deadline chose them; None keeps the scene's settings
     resume: True leaves the output file alone if it already holds this picture
+    instances: True if the record must tell which objects the picture shows, and where
     known: digest of the picture and SHA-256 of each of its files, as the manifest records them; empty if it has no record
     """
 
@@ -41,6 +42,7 @@ class Task:
     tile: int | None = None
     settings: tuple[Mapping[str, Any], ...] | None = None
     resume: bool = False
+    instances: bool = False
     known: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:

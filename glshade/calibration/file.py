@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path, PurePosixPath
 
@@ -14,22 +15,50 @@ from glshade.files import replacing
 def write(path: Path, pictures: Sequence[CalibratedPicture], name: str) -> None:
     """Writes the cameras of pictures. Each file is written whole or not at all.
 
-    path: the file, or the folder for the formats that write several files, which is made if it is missing.
+    path: the file, or the folder for the formats that write several files, . Its folder is made if it is missing.
     name: the name of the format, a key of FORMATS.
     Errors: GlshadeError, also where the format cannot hold one of the cameras.
     """
     writer = FORMATS[name]()
-    flat = [picture.name for picture in pictures if picture.calibration.kind == "orthographic"]
-    if flat and not writer.orthographic:
-        raise GlshadeError(f"{path}: the format {name} holds no orthographic camera, such as that of {flat[0]}; opencv does")
+    check_kind(path, name, next((picture.name for picture in pictures if picture.calibration.kind == "orthographic"), None))
+    check_place(path, name)
     try:
-        if writer.folder:
-            path.mkdir(parents=True, exist_ok=True)
         for part, text in writer.texts(pictures).items():
             with replacing(path / part if part else path) as temporary:
                 temporary.write_text(text, encoding="utf-8")
     except OSError as error:
         raise GlshadeError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def check_place(path: Path, name: str) -> None:
+    """Makes the folder in which cameras will be written, and refuses a place where they cannot be.
+
+    path, name: as for `write`.
+    Errors: GlshadeError.
+    """
+    folder = path if is_folder(name) else path.parent
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise GlshadeError(f"{path}: the folder {folder} cannot be made: {error.strerror}") from None
+    if folder != path and path.is_dir():
+        raise GlshadeError(f"{path}: is a folder, but the format {name} is one file; name a file")
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise GlshadeError(f"{path}: nothing can be written into the folder {folder}; change its permissions")
+
+
+def check_kind(path: Path, name: str, orthographic: str | None) -> None:
+    """Refuses an orthographic camera for a format that holds none.
+
+    path, name: as for `write`.
+    orthographic: the name of a picture or scene whose camera is orthographic; None without one.
+    Errors: GlshadeError.
+    """
+    if orthographic is not None and not FORMATS[name].orthographic:
+        others = " and ".join(other for other, known in FORMATS.items() if known.orthographic)
+        raise GlshadeError(
+            f"{path}: the format {name} holds no orthographic camera, such as that of {orthographic}; {others} do"
+        )
 
 
 def is_folder(name: str) -> bool:
@@ -49,7 +78,7 @@ def read(path: Path) -> list[CalibratedPicture]:
 
     Errors: AssetError, one line that starts with the path, where no format fits, or the file is broken.
     """
-    if not path.exists():
+    if not os.path.exists(path):
         raise AssetError(f"{path}: there is no such file or folder")
     for name, format_class in FORMATS.items():
         reader = format_class()
@@ -57,9 +86,10 @@ def read(path: Path) -> list[CalibratedPicture]:
             continue
         try:
             found = reader.read(path)
-        except (KeyError, TypeError, ValueError, IndexError) as error:
-            told = f"{error} is missing" if isinstance(error, KeyError) else str(error)
-            raise AssetError(f"{path}: is not a readable file of cameras in the format {name}: {told}") from None
+        except KeyError as error:
+            raise AssetError(f"{path}: is not a readable file of cameras in the format {name}: {error} is missing") from None
+        except OSError as error:
+            raise AssetError(f"{path}: cannot be read: {error.strerror or 'unknown fault'}") from None
         if not found:
             raise AssetError(f"{path}: holds no cameras")
         return found

@@ -171,20 +171,28 @@ def limits(command: Any) -> Any:
 
 
 def overrides(command: Any) -> Any:
-    """Adds the options --set, --up and --file-lights.
+    """Adds the options --set, --up, --file-lights and --joint.
 
     The command gets their values as (key, text) pairs in `overrides`, as `glshade.load` takes them.
     """
 
     @wraps(command)
-    def overridden(*arguments: Any, overrides: list[tuple[str, str]], up: str | None, file_lights: bool, **others: Any) -> Any:
-        first = [("up", up)] if up else []
+    def overridden(
+        *arguments: Any,
+        overrides: list[tuple[str, str]],
+        up: str | None,
+        file_lights: bool,
+        joints: list[tuple[str, str]],
+        **others: Any,
+    ) -> Any:
+        first = [*joints, *([("up", up)] if up else [])]
         if file_lights:
             first.append(("file_lights", "true"))
         return command(*arguments, overrides=[*first, *overrides], **others)
 
     help = "Axis of a mesh file that points up; auto is z for .stl and y for the others (docs/files.md). [default: auto]"
     lights = "Draws mesh files with the lights that they hold, in lux and candela, and not with the default lights."
+    overridden = joint(overridden)
     overridden = click.option("--file-lights", is_flag=True, help=lights)(overridden)
     overridden = click.option("--up", type=click.Choice(["x", "y", "z", "auto"]), help=help)(overridden)
     return click.option(
@@ -196,6 +204,29 @@ def overrides(command: Any) -> Any:
         help="Replaces a value of the scene: quality.fresnel=schlick, materials.body.roughness=0.3, "
         "objects.ball.material=gold, lights.0.intensity=2, film.size=[640,360]. Repeatable.",
     )(overridden)
+
+
+def joint(command: Any) -> Any:
+    """Adds the option --joint, whose value `joints` holds overrides: pairs of the key `joints.NAME` and a text."""
+    return click.option(
+        "--joint",
+        "joints",
+        multiple=True,
+        metavar="NAME=VALUE",
+        callback=lambda ctx, param, texts: _joints(texts, param),
+        help="Value of a joint of a robot (.urdf) [radians, or metres of a prismatic joint]. Repeatable.",
+    )(command)
+
+
+def _joints(texts: tuple[str, ...], option: click.Parameter) -> list[tuple[str, str]]:
+    """Returns the overrides for texts NAME=VALUE. A name may hold any characters; the value follows the last =."""
+    pairs = []
+    for text in texts:
+        name, equals, value = text.rpartition("=")
+        if not (name.strip() and equals and value.strip()):
+            raise click.BadParameter(f"{text!r} is not NAME=VALUE such as elbow=0.5", param=option)
+        pairs.append((f"joints.{name.strip()}", value.strip()))
+    return pairs
 
 
 def _assignments(texts: tuple[str, ...], option: click.Parameter) -> list[tuple[str, str]]:

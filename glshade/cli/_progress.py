@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from glshade.batch import events
 from glshade.cli import silence
 from glshade.errors import printable
 
@@ -133,15 +134,12 @@ class Json(Plain):
 
     def begin(self, pictures: int, jobs: int, driver: str) -> None:
         """Prints the number of pictures, the number of jobs and the driver."""
-        self._event("begin", {"pictures": pictures, "jobs": jobs, "driver": driver})
+        self._event(events.began(pictures, jobs, driver))
 
     def picture(self, task: Task, record: Record) -> None:
         """Prints the record, with the scene, frame and camera of its task."""
         super().picture(task, record)
-        given: dict[str, Any] = {"scene": task.scene, "frame": task.frame, "camera": task.camera}
-        given = {key: value for key, value in given.items() if value is not None}
-        result = record.as_dict()
-        self._event(result.pop("state"), given | result)
+        self._event(events.picture(task, record))
 
     def path(self, output: str) -> None:
         """Prints nothing, because the event holds the path."""
@@ -149,12 +147,10 @@ class Json(Plain):
     def end(self, outcome: Outcome) -> None:
         """Prints the numbers of pictures and the times."""
         super().end(outcome)
-        counts = {name: getattr(outcome, name) for name in ("done", "skipped", "failed", "left")}
-        seconds = {"seconds": outcome.seconds, "seconds_pictures": outcome.seconds_pictures}
-        self._event("end", counts | seconds)
+        self._event(events.ended(outcome))
 
-    def _event(self, name: str, values: dict[str, Any]) -> None:
-        self._print(json.dumps({"event": name, **values}))
+    def _event(self, event: dict[str, Any]) -> None:
+        self._print(json.dumps(event))
 
 
 def progress(as_json: bool, several: bool, manifest: str | None) -> Plain:

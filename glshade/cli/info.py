@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import click
 
-from glshade.cli._options import limits
+from glshade.cli._options import joint, limits
 from glshade.errors import AssetError, GlshadeError, printable
 from glshade.limits import Limits
 
@@ -21,8 +22,9 @@ UNUSABLE = 3
 @click.command()
 @click.argument("files", metavar="FILE...", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--json", "as_json", is_flag=True, help="Prints all facts as one JSON list.")
+@joint
 @limits
-def command(files: tuple[Path, ...], as_json: bool, limits: Limits) -> None:
+def command(files: tuple[Path, ...], as_json: bool, joints: list[tuple[str, str]], limits: Limits) -> None:
     """Says what each FILE holds: a mesh file, a picture or a scene file.
 
     For a mesh file: its parts, size, unit, closedness, winding, materials, textures, lights and cameras, and a note on all that
@@ -34,7 +36,7 @@ def command(files: tuple[Path, ...], as_json: bool, limits: Limits) -> None:
     facts: list[dict[str, Any]] = []
     for path in files:
         try:
-            facts.append(information(path, limits))
+            facts.append(information(path, limits, joints))
         except GlshadeError as error:
             lines = getattr(error, "problems", ()) or str(error).splitlines()
             facts.append({"file": str(path), "error": "\n".join(map(str, lines))})
@@ -56,8 +58,12 @@ def command(files: tuple[Path, ...], as_json: bool, limits: Limits) -> None:
         raise SystemExit(UNUSABLE)
 
 
-def information(path: Path, limits: Limits) -> dict[str, Any]:
-    """Returns the facts about a file, as a table that can be written as JSON. Errors: GlshadeError, OSError."""
+def information(path: Path, limits: Limits, joints: Sequence[tuple[str, str]] = ()) -> dict[str, Any]:
+    """Returns the facts about a file, as a table that can be written as JSON.
+
+    joints: overrides that set the joints of a robot.
+    Errors: GlshadeError, OSError.
+    """
     from glshade.mesh.formats import SUFFIXES
 
     suffix = path.suffix.lower()
@@ -69,6 +75,10 @@ def information(path: Path, limits: Limits) -> dict[str, Any]:
         return mesh_information(path, limits)
     from glshade.scene.file import TEXT_SUFFIXES
 
+    if suffix == ".urdf":
+        return robot_information(path, limits, joints)
+    if joints:
+        raise AssetError(f"{path}: --joint is for robots (.urdf files); this file has no joints")
     if suffix in TEXT_SUFFIXES:
         return scene_information(path, limits)
     if not path.exists():
@@ -78,11 +88,25 @@ def information(path: Path, limits: Limits) -> dict[str, Any]:
     return picture_information(path)
 
 
-def scene_information(path: Path, limits: Limits) -> dict[str, Any]:
+def robot_information(path: Path, limits: Limits, joints: Sequence[tuple[str, str]]) -> dict[str, Any]:
+    """Returns the facts about a robot at values of its joints. Errors: SceneError, MissingLibrary."""
+    from dataclasses import asdict
+
+    from glshade.scene.joints import split
+    from glshade.scene.robot import Robot
+
+    facts = scene_information(path, limits, joints)
+    states = [asdict(state) for state in Robot(path, split(joints, path)[0], limits).joints]
+    # JSON has no infinite numbers.
+    states = [{key: None if value in (math.inf, -math.inf) else value for key, value in state.items()} for state in states]
+    return {**facts, "kind": "robot", "joints": states}
+
+
+def scene_information(path: Path, limits: Limits, overrides: Sequence[tuple[str, str]] = ()) -> dict[str, Any]:
     """Returns the facts about a scene file. Errors: SceneError."""
     from glshade.scene.file import SceneFile
 
-    scene = SceneFile(path, limits=limits).scene()
+    scene = SceneFile(path, overrides, limits).scene()
     return {
         "file": str(path),
         "kind": "scene",
@@ -100,7 +124,7 @@ def scene_information(path: Path, limits: Limits) -> dict[str, Any]:
 
 def rows(facts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     """Yields (name, text) of each row of a file's table."""
-    kinds = {"mesh": _mesh_rows, "picture": _picture_rows, "scene": _scene_rows}
+    kinds = {"mesh": _mesh_rows, "picture": _picture_rows, "scene": _scene_rows, "robot": _robot_rows}
     yield from ((name, text) for name, text in kinds[facts["kind"]](facts) if text)
 
 
@@ -126,8 +150,8 @@ def _mesh_rows(facts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield from _some("part", [_part_text(part) for part in parts])
     yield from _some("material", [_material_text(material) for material in facts["materials"]])
     yield "extensions", ", ".join(f"{name}{' (required)' if needed else ''}" for name, needed in facts["extensions"].items())
-    yield "lights", ", ".join(facts["lights"])
-    yield "cameras", ", ".join(facts["cameras"])
+    yield "lights", f"{', '.join(facts['lights'])} (drawn with --file-lights)" if facts["lights"] else ""
+    yield "cameras", f"{', '.join(facts['cameras'])} (drawn with --camera NAME)" if facts["cameras"] else ""
     yield from _some("note", facts["warnings"] or ["none"])
 
 
@@ -165,6 +189,25 @@ def _scene_rows(facts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
     yield "lights", "the default lights" if facts["lights"] is None else ", ".join(facts["lights"]) or "none"
     yield "cameras", ", ".join([facts["camera"], *facts["cameras"]])
     yield "animation", _counted(facts["tracks"], "tracks") if facts["tracks"] else ""
+
+
+def _robot_rows(facts: Mapping[str, Any]) -> Iterator[tuple[str, str]]:
+    yield "format", "robot (URDF)"
+    yield "description", facts["description"]
+    yield "objects", str(facts["objects"])
+    yield from _some("mesh", facts["meshes"])
+    yield from _some("joint", [_joint_text(joint) for joint in facts["joints"]])
+
+
+def _joint_text(joint: Mapping[str, Any]) -> str:
+    """Returns the name, the type, the value and the limits of a joint."""
+    text = f"{joint['name']}: {joint['kind']}"
+    if joint["mimics"]:
+        return f"{text}, {joint['value']:.6g}, follows {joint['mimics']}"
+    if joint["kind"] not in ("revolute", "continuous", "prismatic"):
+        return text
+    limited = joint["low"] is not None
+    return f"{text}, {joint['value']:.6g}" + (f", from {joint['low']:.6g} to {joint['high']:.6g}" if limited else "")
 
 
 def _some(name: str, texts: list[str]) -> Iterator[tuple[str, str]]:

@@ -6,7 +6,6 @@ import json
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import asdict, replace
 from pathlib import Path
 from time import perf_counter
@@ -21,6 +20,7 @@ from glshade.limits import DEFAULT, MOST_TASKS, Limits
 from glshade.mesh.formats import SUFFIXES
 
 if TYPE_CHECKING:
+    from glshade.batch.batch import Display
     from glshade.batch.frames import Shot
     from glshade.batch.maker import Maker
     from glshade.batch.task import Task
@@ -61,6 +61,12 @@ if TYPE_CHECKING:
     "--cameras-format",
     type=click.Choice(CAMERA_FORMATS),
     help="Format of --cameras. [default: nerf for transforms.json, opencv for other .json files, else colmap]",
+)
+@click.option(
+    "--coco",
+    type=click.Path(path_type=Path, dir_okay=False),
+    metavar="FILE",
+    help="Writes the boxes and masks of the objects in all pictures to a JSON file, as COCO defines it.",
 )
 @click.option(
     "--sweep",
@@ -134,6 +140,11 @@ if TYPE_CHECKING:
     help="Writes layers beside the picture, such as depth, normal or lights; repeatable.",
 )
 @click.option(
+    "--aov-format",
+    type=click.Choice(["exr", "png"]),
+    help="Stores the layers in float32 (exr), or each as a PNG file of codes (png). [default: exr]",
+)
+@click.option(
     "--budget",
     multiple=True,
     metavar="METRIC=LIMIT",
@@ -157,6 +168,7 @@ def command(
     cameras_from: Path | None,
     cameras_file: Path | None,
     cameras_format: str | None,
+    coco: Path | None,
     sweeps: tuple[str, ...],
     overwrite: bool,
     skip_existing: bool,
@@ -189,6 +201,7 @@ def command(
     files exists, unless --overwrite, --skip-existing or --resume is given.
     """
     since = perf_counter()
+    from glshade.batch.batch import Means, Wanted, existing, make
     from glshade.image.file import check_suffix
 
     if output is not None:
@@ -212,53 +225,28 @@ def command(
     pictures = _pictures(scenes, frames, cameras, output, sweeps, max_tasks)
     raised = {name: value for name, value in asdict(limits).items() if value != getattr(DEFAULT, name)}
     common = {"limits": raised, "film": film, "shading": shading, "reference": reference, "tile": tile, "resume": resume}
+    common["instances"] = coco is not None
     tasks = [_task(number, picture, overrides, common) for number, picture in enumerate(pictures)]
-    several = len(tasks) > 1 or cluster is not None
     skipped = [task for task in tasks if os.path.exists(task.output)] if skip_existing else []
-    if len(tasks) > 1 and not (overwrite or skip_existing or resume):
-        _refuse_existing(tasks)
-    left = {task.number for task in tasks} - {task.number for task in skipped}
-    wanted = [task for task in tasks if task.number in left]
-    if several and manifest is None:
-        manifest = _default_manifest(tasks)
+    if len(tasks) > 1 and not (overwrite or skip_existing or resume) and (there := existing(tasks)):
+        raise click.UsageError(f"{there} exists: choose --overwrite, --skip-existing or --resume")
+    _check_cluster(cluster, jobs)
 
-    options = {"backend": backend, "reference": reference, "shaders": shaders, "models": models, "retries": retries}
-    with ExitStack() as stack:
-        workers = None
-        if several and wanted:
-            # The workers start while this process imports further modules and checks the scenes.
-            workers = stack.enter_context(_workers(cluster, jobs, len(wanted), device, options))
+    def prepare(wanted: list[Task], maker: Maker, display: Display) -> tuple[list[Task], dict[int, Scene]]:
+        first = _checked(wanted, maker, display)
+        if not (allowed or deadline):
+            return wanted, first
+        # --budget and --deadline change the settings of the scenes that were checked, so those are not used again.
+        return _at_settings(wanted, first, maker, allowed, deadline), {}
 
-        from glshade.batch import leftovers
-        from glshade.batch.maker import Maker
-        from glshade.batch.manifest import Manifest
-        from glshade.batch.run import run_batch
+    def displayed(several: bool, path: str | None) -> Plain:
         from glshade.cli._progress import progress
 
-        display = progress(as_json, several, str(manifest) if manifest else None)
-        maker = Maker(backend, device, shaders, models)
-        stack.callback(maker.close)
-        first = _checked(wanted, maker, display)
-        if allowed or deadline:
-            wanted = _at_settings(wanted, first, maker, allowed, deadline)
-        if workers is None:
-            from glshade.batch.in_process import InProcess
+        return progress(as_json, several, path)
 
-            # The scenes that were checked are used again, unless --budget or --deadline changes their settings.
-            workers = InProcess(maker, {} if allowed or deadline else first, reference)
-        if several:
-            _make_folders(wanted)
-        leftovers.remove(task.output for task in wanted)
-        log = stack.enter_context(Manifest(manifest)) if manifest and wanted else None
-        if log is not None and resume:
-            wanted = [replace(task, known=log.known(task.output)) for task in wanted]
-        outcome = run_batch(wanted, workers, log, display, skipped=skipped, since=since)
-        if cameras_file is not None:
-            _write_cameras(cameras_file, cameras_format, tasks, outcome.seen, display)
-    if several:
-        # A worker of a command that was killed may have been alive when this batch began, and have ended since.
-        leftovers.remove(task.output for task in wanted)
-    ctx.exit(outcome.exit_code)
+    means = Means(jobs, cluster, device, backend, reference, shaders, models, retries)
+    wanted = Wanted(tasks, skipped, resume, manifest, cameras_file, cameras_format, coco)
+    ctx.exit(make(wanted, means, displayed, prepare, since=since).exit_code)
 
 
 def _pictures(
@@ -305,64 +293,21 @@ def _task(number: int, picture: Shot, overrides: Sequence[tuple[str, str]], comm
     return Task(number, scene, output, changes, picture.frame, picture.camera, **common)
 
 
-def _write_cameras(
-    path: Path, name: str | None, tasks: Sequence[Task], seen: Mapping[int, Mapping[str, Any]], display: Plain
-) -> None:
-    """Writes how the pictures were seen. The arguments are those of `batch.cameras.write`. Errors: GlshadeError."""
-    from glshade.batch import cameras
-    from glshade.calibration.file import usual_format
+def _check_cluster(cluster: str | None, jobs: int | None) -> None:
+    """Checks the values of --cluster and --jobs. Errors: click.UsageError."""
+    if cluster is None:
+        return
+    from glshade.batch.cluster import LOCAL, check_address
 
-    for missing in cameras.write(path, name or usual_format(path), tasks, seen):
-        display.warn(f"{path}: lacks {missing}, which existed and does not tell how it was seen")
-
-
-def _refuse_existing(tasks: Sequence[Task]) -> None:
-    """Checks that no picture's file exists yet. Errors: click.UsageError if one does."""
-    existing = [task.output for task in tasks if os.path.exists(task.output)]
-    if existing:
-        more = f" and {len(existing) - 1} more" if len(existing) > 1 else ""
-        raise click.UsageError(f"{existing[0]}{more} exists: choose --overwrite, --skip-existing or --resume")
-
-
-def _default_manifest(tasks: Sequence[Task]) -> Path:
-    """Returns manifest.jsonl in the folder that the pictures have in common."""
-    folder = os.path.commonpath([os.path.abspath(os.path.dirname(task.output)) for task in tasks])
-    return Path(os.path.relpath(folder)) / "manifest.jsonl"
-
-
-def _workers(cluster: str | None, jobs: int | None, pictures: int, device: int | None, options: dict[str, Any]) -> Any:
-    """Starts a pool or a cluster, and returns it: an Engine that is a context manager.
-
-    cluster: value of --cluster; None starts a pool
-    jobs: number of workers; None selects the default
-    pictures: number of pictures to make
-    device: EGL device for all workers; None spreads them over the GPUs
-    options: backend, reference, shaders, models and retries, as Pool and Cluster take them
-    Errors: click.UsageError; those of Pool and Cluster.
-    """
-    from glshade.batch.jobs import devices, gpus
-
-    local = cluster in (None, "local")
-    if jobs and not local:
+    if jobs and cluster != LOCAL:
         raise click.UsageError("--jobs is for workers on this machine; a scheduler has workers of its own")
-    may_use_gpus = local and device is None and not options["reference"] and options["backend"] in ("auto", "egl")
-    hardware = gpus() if may_use_gpus else []
-    assigned = devices(jobs, pictures, hardware if device is None else [device])
-    options = {**options, "hardware": bool(hardware), "shares": len(assigned) > 1}
-    if cluster is not None:
-        from glshade.batch.cluster import Cluster, check_address
-
-        try:
-            check_address(cluster)
-        except ValueError as error:
-            raise click.BadParameter(str(error), param_hint="'--cluster'") from None
-        return Cluster(cluster, assigned, **options)
-    from glshade.batch.pool import Pool
-
-    return Pool(assigned, **options)
+    try:
+        check_address(cluster)
+    except ValueError as error:
+        raise click.BadParameter(str(error), param_hint="'--cluster'") from None
 
 
-def _checked(tasks: Sequence[Task], maker: Maker, display: Plain) -> dict[int, Scene]:
+def _checked(tasks: Sequence[Task], maker: Maker, display: Display) -> dict[int, Scene]:
     """Loads the scene of the first task of each scene file, so that faults are found before a context is opened.
 
     tasks: the tasks to check
@@ -400,20 +345,6 @@ def _at_settings(
             choice = _chosen(first[task.number], maker.renderer, limits, deadline)
             chosen[task.scene] = tuple(setting.as_dict() for setting in choice.settings)
     return [replace(task, settings=chosen[task.scene]) for task in tasks]
-
-
-def _make_folders(tasks: Sequence[Task]) -> None:
-    """Creates the folders of a batch's pictures. The folder of a single picture is not created: it must exist already.
-
-    Errors: GlshadeError.
-    """
-    from glshade.errors import GlshadeError
-
-    for folder in dict.fromkeys(os.path.dirname(task.output) for task in tasks):
-        try:
-            os.makedirs(folder or ".", exist_ok=True)
-        except OSError as error:
-            raise GlshadeError(f"{folder}: cannot be made: {error.strerror}") from None
 
 
 def _configuration(text: str) -> str:

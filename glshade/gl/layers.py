@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,7 @@ from glshade.image import cryptomatte
 from glshade.image.image import Image
 from glshade.image.layers import Layers, names_attribute
 from glshade.radiance.readying import ready
+from glshade.scene import labels
 from glshade.scene.film import Film
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
@@ -58,7 +59,8 @@ def draw_layers(renderer: Draws, scene: Scene, dtype: str, shading: Rate | None,
     arrays: Arrays = {}
     for aov in scene.film.aovs:
         arrays |= getattr(maker, aov)()
-    return Layers(image, arrays, maker.attributes)
+    film = scene.film
+    return Layers(image, arrays, maker.attributes, film.aov_format, film.depth_scale, maker.legends)
 
 
 def surfaces(renderer: Draws, scene: Scene) -> tuple[Array, Numbers]:
@@ -85,6 +87,7 @@ class _Maker:
         self._renderer, self._scene, self._shading, self._tile = renderer, scene, shading, tile
         self.assembly = ready(scene, shading)
         self.attributes: dict[str, str] = {}
+        self.legends: dict[str, dict[int, Any]] = {}
 
     def _draw(self, part: Part) -> Array:
         """Returns the pixels (H, W, 4) of a part of the scene."""
@@ -106,17 +109,34 @@ class _Maker:
         return {"position": _float32(np.where((instance >= 0)[..., None], place, 0.0))}
 
     def object_id(self) -> Arrays:
-        names = [item.name or f"objects[{index}]" for index, item in enumerate(self._scene.objects)]
-        return self._ids("object_id", [names[instance.number] for instance in self.assembly.instances], names)
+        names, categories = labels.names(self._scene), labels.object_categories(self._scene)
+        layer = self._ids("object_id", [names[instance.number] for instance in self.assembly.instances], names)
+        materials: dict[int, dict[str, None]] = {}
+        for instance in self.assembly.instances:
+            materials.setdefault(instance.number, {})[instance.made_of] = None
+        self.legends["object_id"] = {
+            number + 1: {"name": names[number], "category": categories[number], "materials": list(made_of)}
+            for number, made_of in sorted(materials.items())
+        }
+        return layer
 
     def material_id(self) -> Arrays:
         materials = [instance.made_of for instance in self.assembly.instances]
         return self._ids("material_id", materials, list(dict.fromkeys(materials)))
 
+    def semantic_id(self) -> Arrays:
+        categories = labels.object_categories(self._scene)
+        names = [categories[instance.number] for instance in self.assembly.instances]
+        return self._ids("semantic_id", names, labels.categories(self._scene))
+
+    def mask(self) -> Arrays:
+        return {"mask": (self.nearest[1] >= 0).astype(np.float32)[..., None]}
+
     def _ids(self, layer: str, instance_names: list[str], names: list[str]) -> Arrays:
         """Returns a layer of numbers: each pixel has the position (from 1) of its instance's name in `names`, or 0 for none."""
         ids = {name: index + 1 for index, name in enumerate(names)}
         self.attributes[f"glshade:{layer}"] = names_attribute(names)
+        self.legends[layer] = {number: {"name": name} for name, number in ids.items()}
         values = np.array([*(ids[name] for name in instance_names), 0], dtype=np.float32)
         return {layer: values[self.nearest[1]][..., None]}
 

@@ -11,8 +11,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.arrays import precision
 from glshade.assembly.assembly import Assembly
-from glshade.assembly.culling import facing
+from glshade.assembly.culling import WORTHWHILE, facing
 from glshade.assembly.instance import Instance
 from glshade.errors import SceneError
 from glshade.gl.frame import FORMATS, Storage
@@ -20,7 +21,7 @@ from glshade.gl.program import Program
 from glshade.gl.resources import Resources, texture_size
 from glshade.glsl.generator import generate
 from glshade.glsl.plan import PAGE, ProgramPlan
-from glshade.glsl.planner import further_plan, plan_instance
+from glshade.glsl.planner import further_plan, plan_instance, viewer_of
 from glshade.glsl.shaders import Shaders
 from glshade.glsl.source import Rewrite
 from glshade.glsl.uniforms import Values, exposed_uniforms, light_pages, light_uniforms, object_uniforms, textures
@@ -75,6 +76,7 @@ class Prepared:
     shaders: the shader files that its programs are made from.
     files: the paths of the shader files that its programs hold.
     attributes: the attributes of a float picture of the scene; None until the renderer has computed them.
+    worlds: the transforms (N, 4, 4) to world space of the calls' instances; None until another view needs them.
     """
 
     scene: Scene
@@ -83,6 +85,7 @@ class Prepared:
     shaders: Shaders
     files: frozenset[str]
     attributes: dict[str, str] | None = None
+    worlds: NDArray[np.float64] | None = None
 
     def is_current(self) -> bool:
         """Returns whether none of its shader files has changed."""
@@ -138,6 +141,19 @@ class Preparer:
         calls = _Calls(self._resources, scene, assembly, shaders, rewrite)
         return Prepared(scene, assembly, list(calls.draw_calls(encoding)), shaders, calls.files)
 
+    def seen_anew(self, before: Prepared, scene: Scene, assembly: Assembly) -> Prepared | None:
+        """Returns a scene ready to draw that differs from a prepared one in its camera alone; None where its programs differ.
+
+        before: the prepared scene, whose shader files are current.
+        scene: the scene to draw.
+        assembly: its assembly, made by `assembly.seen_anew`.
+        Errors: SceneError.
+        """
+        calls = _Calls(self._resources, scene, assembly, before.shaders, None).seen_anew(before)
+        if calls is None:
+            return None
+        return Prepared(scene, assembly, calls, before.shaders, before.files, worlds=before.worlds)
+
 
 class _Calls:
     """Makes the draw calls of one scene.
@@ -152,6 +168,8 @@ class _Calls:
         self._assembly, self._exposure = assembly, scene.film.exposure
         self._shaders, self._rewrite = shaders, rewrite
         self._programs: dict[ProgramPlan, Program] = {}
+        # Equal values share one array, by which the renderer sees that a program has the value already.
+        self._arrays: dict[tuple[str, bytes], NDArray[np.float32]] = {}
         self.files: frozenset[str] = frozenset()
         triangles = sum(len(instance.mesh.triangles) for instance in assembly.instances)
         width, height = scene.film.size
@@ -176,6 +194,39 @@ class _Calls:
                 _check_finite(instance, lights)
                 shared[key] = lights, self._pages(plan, instance)
             yield from self._of_instance(plan, instance, *shared[key])
+
+    def seen_anew(self, before: Prepared) -> list[DrawCall] | None:
+        """Returns the draw calls of a prepared scene for another view; None where more than their uniforms may differ."""
+        view, calls = self._assembly.view, before.calls
+        plan = calls[0].plan
+        if plan.viewer != viewer_of(view) or plan.scaled != self._scaled or before.blends or any(call.pages for call in calls):
+            return None
+        if before.worlds is None:
+            before.worlds = np.stack([call.instance.world_from_object for call in calls])
+        relative = before.worlds.copy()
+        relative[:, :3, 3] -= view.eye
+        with np.errstate(over="ignore"):
+            placed = relative.astype(precision())
+        if not np.isfinite(placed).all():
+            return None  # the full preparation reports the object
+        # Calls share the table of their lights if they have the same plan and the same lights.
+        shared: dict[int, Values] = {}
+        result = []
+        for call, world in zip(calls, placed, strict=True):
+            instance, plan, lights = call.instance, call.plan, shared.get(id(call.lights))
+            if lights is None:
+                lights = shared[id(call.lights)] = light_uniforms(plan, self._assembly, instance.lights, self._exposure)
+                _check_finite(instance, lights)
+            samplers, vertices = call.samplers, call.vertices
+            if samplers:
+                # A picture's file may have changed.
+                texels = textures(plan, instance.material)
+                samplers = [(name, self._resources.texture(found)) for name, found in texels.items()]
+            if len(instance.mesh.triangles) >= WORTHWHILE:
+                vertices = self._resources.vertices.array(instance.mesh, call.program, facing(instance, view))
+            values = {**call.values, "u_world_from_object": world}
+            result.append(DrawCall(instance, plan, call.program, vertices, values, samplers, lights, []))
+        return result
 
     def _back_to_front(self, blended: list[tuple[ProgramPlan, Instance]]) -> list[tuple[ProgramPlan, Instance]]:
         """Blended instances, ordered by the mean of their vertices, the farthest first."""
@@ -205,6 +256,7 @@ class _Calls:
             values = object_uniforms(page_plan, instance, assembly.view.eye)
             values |= exposed_uniforms(page_plan, instance, assembly, self._exposure)
             _check_finite(instance, values)
+            values = {name: self._arrays.setdefault((name, value.tobytes()), value) for name, value in values.items()}
             all_texels = textures(page_plan, instance.material)
             samplers = [(name, self._resources.texture(texels)) for name, texels in all_texels.items()]
             vertices = self._resources.vertices.array(instance.mesh, program, triangles)

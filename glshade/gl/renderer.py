@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.arrays import rounded
+from glshade.assembly.assembly import seen_anew
 from glshade.gl.context import Backend, Context, open_context
 from glshade.gl.frame import Box, Frame
 from glshade.gl.preparation import DrawCall, Encoding, Prepared, Preparer
@@ -78,6 +79,8 @@ class Renderer:
         self.resources = Resources(self.context)
         self._preparer = Preparer(self.resources)
         self._prepared: Lru[tuple[Any, ...], Prepared] = Lru(SCENES_SIZE, most=SCENES)
+        # The scene that was prepared last, with its key in the cache apart from the scene itself.
+        self._newest: tuple[tuple[Any, ...], Prepared] | None = None
         # A context is current in one thread at most. Whoever draws enters it.
         self.context.leave()
 
@@ -201,10 +204,28 @@ class Renderer:
         key = (id(scene), shading, encoding, part, self.rewrite)
         prepared = self._prepared.get(key)
         if prepared is None or prepared.scene is not scene or not self._is_current(prepared):
-            assembly = ready(scene, shading, part)
-            prepared = self._preparer.prepare(scene, assembly, encoding, self.current_shaders(), self.rewrite)
+            prepared = self._seen_anew(scene, key)
+            if prepared is None:
+                assembly = ready(scene, shading, part)
+                prepared = self._preparer.prepare(scene, assembly, encoding, self.current_shaders(), self.rewrite)
             self._prepared.put(key, prepared, prepared.size)
+        self._newest = key[1:], prepared
         return prepared
+
+    def _seen_anew(self, scene: Scene, key: tuple[Any, ...]) -> Prepared | None:
+        """Returns the scene ready to draw if it differs from the newest prepared scene in its camera alone; else None.
+
+        key: the scene's key in the cache.
+        """
+        if self._newest is None or self._newest[0] != key[1:]:
+            return None
+        before = self._newest[1]
+        refined = any(instance.rate == "gouraud" and instance.quality.refine for instance in before.assembly.instances)
+        # The assembly of a part of the light has other instances than the scene.
+        if key[3] is not None or refined or not self._is_current(before) or not scene.differs_in_camera(before.scene):
+            return None
+        assembly = seen_anew(before.assembly, scene)
+        return None if assembly is None else self._preparer.seen_anew(before, scene, assembly)
 
     def age(self) -> None:
         """Marks everything that is cached as unused. Whatever later pictures need counts as used again."""
@@ -214,6 +235,7 @@ class Renderer:
     def evict_unused(self) -> None:
         """Frees everything that is cached and that no picture has needed since the last call of `age`."""
         self._prepared.evict_unused()
+        self._newest = None
         self.resources.evict_unused()
         with self.context.gl:
             self.context.gl.gc()
@@ -237,14 +259,15 @@ class Renderer:
         gl.enable_only(moderngl.DEPTH_TEST)
         gl.depth_func = ">"
         viewer = rounded(prepared.assembly.view.toward_viewer)
-        # A program keeps its uniforms from call to call, so those of the view and the lights are set only when they change.
-        placed: set[int] = set()
+        # A program keeps its uniforms from call to call, so that they are set only when they change.
+        held: dict[int, dict[str, NDArray[np.float32]]] = {}
         lit: dict[int, int] = {}
         state: tuple[bool, ...] = ()
         for call in prepared.calls if calls is None else calls:
             program = call.program
-            if id(program) not in placed:
-                placed.add(id(program))
+            values = held.get(id(program))
+            if values is None:
+                values = held[id(program)] = {}
                 program.write("u_clip_from_world", clip)
                 program.write("u_viewer", viewer)
             if lit.get(id(program)) != id(call.lights):
@@ -252,7 +275,9 @@ class Renderer:
                 for name, value in call.lights.items():
                     program.write(name, value)
             for name, value in call.values.items():
-                program.write(name, value)
+                if values.get(name) is not value:
+                    values[name] = value
+                    program.write(name, value)
             for unit, (name, texture) in enumerate(call.samplers):
                 texture.use(unit)
                 program.set_integer(name, unit)

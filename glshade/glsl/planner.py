@@ -94,7 +94,7 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         parameters=tuple(parameters),
         lights=groups,
         ambient=ambient,
-        viewer=_viewer(assembly.view),
+        viewer=viewer_of(assembly.view),
         both_sides=instance.back_faces and bool(groups),
         alpha="opaque" if material.alpha_mode == "mask" and whole else material.alpha_mode,
         alpha_from=base if carries_alpha else None,
@@ -165,7 +165,8 @@ def _groups(lights: Iterable[Light]) -> tuple[LightGroup, ...]:
     return tuple(groups)
 
 
-def _viewer(view: View) -> Viewer:
+def viewer_of(view: View) -> Viewer:
+    """Returns how a program computes the direction to the viewer."""
     if not view.perspective:
         return "orthographic"
     return "perspective" if view.near >= CLOSEST else "perspective_close"
@@ -189,7 +190,7 @@ def _bare(instance: Instance, assembly: Assembly, encoding: Literal["linear", "s
         parameters=(),
         lights=(),
         ambient="none",
-        viewer=_viewer(assembly.view),
+        viewer=viewer_of(assembly.view),
         both_sides=normal and instance.back_faces,
         alpha="mask" if masked and not whole else "opaque",
         alpha_from=base if carries_alpha else None,

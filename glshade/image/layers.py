@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,8 +29,13 @@ AOVS = (
     "background",
     "object_id",
     "material_id",
+    "semantic_id",
+    "mask",
     "cryptomatte",
 )
+# The layers that can be stored as PNG: those whose values have a natural range of codes.
+PNG_AOVS = ("depth", "normal", "view_normal", "object_id", "material_id", "semantic_id", "mask")
+LayerFormat = Literal["exr", "png"]
 # The channel letters of layers that are not colours. Compositing programs expect Z for a depth, XYZ for a vector and UV for
 # texture coordinates; I for an index is Mitsuba's.
 CHANNELS = {
@@ -41,6 +46,8 @@ CHANNELS = {
     "uv": "UV",
     "object_id": "I",
     "material_id": "I",
+    "semantic_id": "I",
+    "mask": "Y",
 }
 
 
@@ -50,12 +57,18 @@ class Layers:
 
     image: the picture.
     arrays: name -> (H, W, C) float32, row 0 at the top; colours are linear Rec. 709 and premultiplied.
-    attributes: texts about the layers, by name, for the file that holds them.
+    attributes: texts about the layers, by name, for the EXR file that holds them.
+    form: "exr" stores all layers in one file, "png" each in a file of its own.
+    depth_scale: depth that one code of a PNG stands for [scene units]; None chooses a round number that fits.
+    legends: name of a layer of numbers -> number -> what it stands for, as JSON types.
     """
 
     image: Image
     arrays: dict[str, NDArray[np.float32]]
     attributes: dict[str, str] = field(default_factory=dict)
+    form: LayerFormat = "exr"
+    depth_scale: float | None = None
+    legends: dict[str, dict[int, Any]] = field(default_factory=dict)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -70,7 +83,8 @@ class Layers:
         """Writes the picture and its layers.
 
         A format that holds layers (OpenEXR) gets one file, with the picture in the channels R, G, B (and A). In other formats
-        Image.save writes the picture, and the layers go to NAME.aovs.exr in the same folder.
+        Image.save writes the picture, and the layers go to NAME.aovs.exr in the same folder. With the form "png" each layer
+        goes to NAME.LAYER.png, and NAME.aovs.json says what the codes mean.
         attributes: optional texts about the picture, added to the image's own, by name.
         Errors: GlshadeError.
         """
@@ -78,6 +92,12 @@ class Layers:
 
         path = Path(path)
         picture = replace(self.image, attributes={**self.image.attributes, **(attributes or {})})
+        if self.form == "png" and self.arrays:
+            from glshade.image.png_layers import write
+
+            write(path, self, picture)
+            picture.save(path)
+            return
         if format_of(path).layers and self.arrays:
             linear = picture.linear()
             self._write(path, (*linear.channels, *self.channels), [linear.pixels, *self.arrays.values()], picture)
@@ -108,6 +128,32 @@ class Layers:
 def layers_path(path: Path) -> Path:
     """Returns the path of the separate file that stores a picture's layers if the picture's format cannot store them."""
     return path.with_name(f"{path.stem}.aovs.exr")
+
+
+def layer_files(path: Path, aovs: Iterable[str], form: LayerFormat) -> list[Path]:
+    """Returns the separate files of a picture's layers, in the order in which they are written.
+
+    path: the picture's file.
+    aovs: the layers that the film asks for.
+    form: the format of the layers.
+    Errors: GlshadeError for a picture whose format is not known.
+    """
+    from glshade.image.file import format_of
+
+    aovs = tuple(dict.fromkeys(aovs))
+    if form == "png":
+        return [*(png_path(path, aov) for aov in aovs), *([legend_path(path)] if aovs else [])]
+    return [layers_path(path)] if aovs and not format_of(path).layers else []
+
+
+def png_path(path: Path, layer: str) -> Path:
+    """Returns the path of the PNG file of one of a picture's layers."""
+    return path.with_name(f"{path.stem}.{layer}.png")
+
+
+def legend_path(path: Path) -> Path:
+    """Returns the path of the file that says what the codes of a picture's layers in PNG files mean."""
+    return path.with_name(f"{path.stem}.aovs.json")
 
 
 def names_attribute(names: list[str]) -> str:

@@ -189,7 +189,8 @@ def _opened(path: Path, *config: oiio.ImageSpec) -> Any:
 def _spec(contents: PictureContents) -> oiio.ImageSpec:
     """Returns OpenImageIO's description of the pixels: their size, type, channels, colour space and kind of alpha."""
     height, width, count = contents.pixels.shape
-    spec = oiio.ImageSpec(width, height, count, "float" if contents.pixels.dtype == "float32" else "uint8")
+    stored = {"float32": "float", "uint16": "uint16"}.get(str(contents.pixels.dtype), "uint8")
+    spec = oiio.ImageSpec(width, height, count, stored)
     if contents.channels is not None:
         spec.channelnames = tuple(contents.channels)
     # Programs take an 8-bit file for sRGB by default, and naming sRGB would make OpenImageIO load a colour configuration, which

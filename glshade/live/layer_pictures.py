@@ -47,7 +47,9 @@ def layer_picture(layer: str, arrays: Mapping[str, Array]) -> Array:
         return _coded(_spread(values, covered) * covered)
     if layer == "uv":
         return _coded(np.concatenate([values % 1.0, np.zeros_like(values[..., :1])], axis=2))
-    if layer in ("object_id", "material_id"):
+    if layer == "mask":
+        return _coded(np.repeat(values, 3, axis=2))
+    if layer in ("object_id", "material_id", "semantic_id"):
         return _coded(_hues(values[..., 0].astype(np.uint32)))
     return _coded(linear_to_srgb(np.maximum(values, 0.0)))
 

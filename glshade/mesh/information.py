@@ -17,6 +17,7 @@ from glshade.limits import DEFAULT, Limits
 from glshade.mesh.file import AssetWarning, load
 from glshade.mesh.model import MeshPart, Model
 from glshade.mesh.reading.gltf_container import MAGIC
+from glshade.mesh.reading.textures import plain, unplaced
 
 # The unit of one number in a file, for formats that fix it. The readers of .dae and .3mf convert to these units.
 UNITS = {".gltf": "metre", ".glb": "metre", ".dae": "metre", ".3mf": "millimetre"}
@@ -50,8 +51,16 @@ def mesh_information(path: Path, limits: Limits = DEFAULT) -> dict[str, Any]:
         "extensions": extensions(path) if suffix in (".gltf", ".glb") else {},
         "lights": [light.get("type", "") for light in getattr(model, "lights", ())],
         "cameras": list(getattr(model, "cameras", ())),
-        "warnings": [str(warning.message).removeprefix(f"{path}: ") for warning in caught],
+        "warnings": [
+            *(str(warning.message).removeprefix(f"{path}: ") for warning in caught),
+            *(unplaced(part.name) for part in model.parts if _is_unplaced(part)),
+        ],
     }
+
+
+def _is_unplaced(part: MeshPart) -> bool:
+    """Returns whether a part has textures, but no texture coordinates."""
+    return part.mesh.uvs is None and part.material is not None and plain(part.material) is not part.material
 
 
 def _part(part: MeshPart) -> dict[str, Any]:

@@ -253,6 +253,11 @@ class Camera(Document):
         return turned
 
     @property
+    def perspective(self) -> bool:
+        """Whether the camera is a pinhole camera; else it is orthographic."""
+        return isinstance(self, Perspective) or getattr(self, "projection", None) == "perspective"
+
+    @property
     def framing(self) -> bool:
         """Whether the camera chooses its own position, such that it sees the whole scene."""
         return self.fit or (self.eye is None and self.matrix is None)
@@ -279,7 +284,7 @@ class Camera(Document):
             pivot = middle if self.target is None else np.array(self.target)
             eye = pivot + self._turned @ (eye - pivot)
         near, far = self.depth_range(-(points - eye) @ axes[2])
-        return View(isinstance(self, Perspective), eye, axes, half_width, half_height, near, far)
+        return View(self.perspective, eye, axes, half_width, half_height, near, far)
 
     def half_size(self, aspect: float) -> tuple[float, float]:
         """Returns half the width and half the height of the picture, at depth 1 if perspective [scene units]."""
@@ -389,6 +394,9 @@ class Orthographic(Camera):
 class Intrinsics(Camera):
     """A calibrated camera: its pixels need not be square, and its axis need not meet the middle of the picture.
 
+    Pixels are counted from the picture's top left corner, so that the middle of the first pixel is (0.5, 0.5). A film of
+    another size shows the same view, stretched to that size: fx and cx grow with its width, fy and cy with its height.
+
     The numbers are those of the camera matrix of computer vision (Hartley and Zisserman 2004, equation 6.10, without skew).
     """
 
@@ -415,7 +423,7 @@ class Intrinsics(Camera):
 
     def view(self, points: Array, aspect: float) -> View:
         view = super().view(points, aspect)
-        return replace(view, perspective=self.projection == "perspective", centre=self.centre)
+        return replace(view, centre=self.centre)
 
     def half_size(self, aspect: float) -> tuple[float, float]:
         return self.width / (2 * self.fx), self.height / (2 * self.fy)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from glshade.scene.scene import Scene
 def scene_digest(scene: Scene) -> str:
     """Returns the SHA-256 of all values of a scene, with the content of every file in place of its path: 64 hex digits.
 
+    Values that are their keys' defaults do not count, so that a scene keeps its digest when a later version has more keys.
     Errors: AssetError for a mesh file, OSError for another file that cannot be read.
     """
 
@@ -26,15 +28,15 @@ def scene_digest(scene: Scene) -> str:
     def content(value: Any) -> Any:
         if isinstance(value, Path) and value.suffix.lower() in mesh_file.SUFFIXES:
             # The model is hashed, not the file's bytes, since the model also has the materials and buffers from other files.
-            parts = load(value).parts
-            return [(part.mesh.digest, part.transform.tolist(), files(part.material)) for part in parts]
+            model = load(value)
+            parts = [(part.mesh.digest, part.transform.tolist(), files(part.material)) for part in model.parts]
+            return [*parts, *model.lights]
         if isinstance(value, Path):
             return hashlib.sha256(read_bytes(value, LARGEST_MESH)).hexdigest()
         if isinstance(value, Mesh):
             return value.digest
         if isinstance(value, Document):
-            # The cameras of the file `cameras_from` are among the scene's cameras.
-            return {key: content(getattr(value, key)) for key in type(value).model_fields if key != "cameras_from"}
+            return {key: content(item) for key, item in _written(value)}
         if isinstance(value, dict):
             return {key: content(item) for key, item in value.items()}
         if isinstance(value, tuple | list):
@@ -49,3 +51,12 @@ def scene_digest(scene: Scene) -> str:
 
     text = json.dumps(content(scene), sort_keys=True, separators=(",", ":"))
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _written(document: Document) -> Iterator[tuple[str, Any]]:
+    """Yields the keys of a document, and their values, that say more than its class and its defaults do."""
+    for key, field in type(document).model_fields.items():
+        value = getattr(document, key)
+        # The cameras of the file `cameras_from` are among the scene's cameras. The other two keys name the document's class.
+        if key in ("type", "brdf") or (key != "cameras_from" and value != field.get_default(call_default_factory=True)):
+            yield key, value

@@ -1,4 +1,4 @@
-"""Scene files: scenes that are read from TOML, from JSON with the same keys, or from a mesh file alone."""
+"""Scene files: scenes that are read from TOML, from JSON with the same keys, or from a mesh file or a robot alone."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from glshade.image.file import probe
 from glshade.limits import DEFAULT, LARGEST_SCENE, MOST_FAULTS, Limits
 from glshade.mesh import file as mesh_file
 from glshade.mesh.model import Model
-from glshade.scene import checking, of_files, up
+from glshade.scene import checking, joints, of_files, up
 from glshade.scene.models import Folders, use_models, use_shader_models
 from glshade.scene.scene import Scene
 
@@ -45,11 +45,12 @@ def load(
 ) -> Scene:
     """Returns the scene in a file, and reads its meshes.
 
-    For a mesh file alone, a default camera and the default lights are chosen, and the materials are the mesh file's own.
-    path: a scene file or a mesh file.
+    For a mesh file alone, a default camera and the default lights are chosen, and the materials are the mesh file's own. So it
+    is for a robot (.urdf), whose links become objects.
+    path: a scene file, a mesh file or a robot's file.
     overrides: values that replace those of the file, in their order: a table of dotted keys such as "materials.body.roughness"
         or "objects.ball.shading"; or pairs of key and text, as in `--set KEY=VALUE`. For a mesh file, "up" names the axis that
-        points up: "x", "y", "z", or "auto" (z for .stl, else y).
+        points up: "x", "y", "z", or "auto" (z for .stl, else y). For a robot, "joints.NAME" is the value of a joint.
     models: a folder, or several, with reflectance models and lights of the user's own.
     shaders: a shader folder, or several, whose files brdf/NAME.glsl may be reflectance models.
     allow_outside: whether mesh files may name textures, materials and buffers outside their folder and the folders that the
@@ -72,8 +73,10 @@ class SceneFile:
 
         Errors: SceneError for a file that cannot be read, and for overrides whose keys name no value.
         """
-        self.path, self.limits = Path(path), limits
+        self.path, self.limits, self._overrides = Path(path), limits, overrides
         suffix = self.path.suffix.lower()
+        if suffix != joints.SUFFIX:
+            overrides = joints.refuse(self.path, overrides)
         if suffix in mesh_file.SUFFIXES:
             mesh_file.load(self.path, limits)
             # Overrides find the object by its name. The path is absolute, so that it is right from any folder.
@@ -85,8 +88,15 @@ class SceneFile:
         elif suffix in TEXT_SUFFIXES:
             up.refuse(self.path, overrides)
             document = _read(self.path)
+        elif suffix == joints.SUFFIX:
+            from glshade.scene import robot
+
+            up.refuse(self.path, overrides)
+            positions, overrides = joints.split(overrides, self.path)
+            document = {**robot.document(self.path, positions, limits), "film": FILM}
+            _refuse([(loc, message) for loc, message in checking.faults(document)], self.path)
         else:
-            known = ", ".join([*TEXT_SUFFIXES, *sorted(mesh_file.SUFFIXES)])
+            known = ", ".join([*TEXT_SUFFIXES, joints.SUFFIX, *sorted(mesh_file.SUFFIXES)])
             raise SceneError(f"{self.path}: {suffix or 'no extension'} is neither a scene nor a mesh; known: {known}")
         document, overrides = of_files.chosen(document, overrides)
         values = _values(overrides, self.path)
@@ -107,10 +117,23 @@ class SceneFile:
         """The scene without its animation. Errors: SceneError."""
         return parse(self.document, self.path, self.limits)
 
+    @cached_property
+    def _other(self) -> SceneFile:
+        """The same file without the overrides of `camera.*`, which belong to the further camera that the scene is seen through.
+
+        Such a camera may have keys that the scene's own camera has not. Errors: SceneError.
+        """
+        if not self._of_camera:
+            return self
+        given = self._overrides
+        pairs = given.items() if isinstance(given, Mapping) else given
+        kept = [(key, value) for key, value in pairs if not key.startswith("camera.")]
+        return SceneFile(self.path, dict(kept) if isinstance(given, Mapping) else kept, self.limits)
+
     @property
     def cameras(self) -> tuple[str, ...]:
         """The names of the scene's further cameras, and those of the cameras in its mesh files. Errors: SceneError."""
-        written = self._written
+        written = self._other._written
         return tuple({**of_files.file_cameras(written, written.loader()), **written.cameras})
 
     def scene(self, frame: float | None = None, camera: str | None = None) -> Scene:
@@ -133,15 +156,15 @@ class SceneFile:
             raise SceneError([fault if fault in own else f"{fault} (from --set)" for fault in error.problems]) from None
 
     def _scene(self, frame: float | None, camera: str | None) -> Scene:
-        scene = self._written if frame is None else self._at(frame)
-        if camera is not None:
-            # The mesh files are read first, because they may hold the camera.
-            self._check(scene)
-            if camera not in scene.cameras and camera not in self.cameras:
-                raise SceneError(f'{self.path}: no camera is named "{camera}"{nearest(camera, self.cameras)}')
-            return self._through(camera, scene)
-        self._check(scene)
-        return scene
+        file = self if camera is None else self._other
+        scene = file._written if frame is None else file._at(frame)
+        # The mesh files are read first, because they may hold the camera.
+        file._check(scene)
+        if camera is None:
+            return scene
+        if camera not in scene.cameras and camera not in self.cameras:
+            raise SceneError(f'{self.path}: no camera is named "{camera}"{nearest(camera, self.cameras)}')
+        return self._through(camera, scene)
 
     def _at(self, frame: float) -> Scene:
         """Returns the scene at a frame. Values that no track changes are not validated again and stay the same objects."""

@@ -17,7 +17,7 @@ from pydantic import (
 
 from glshade.document import Document, Finite, fault, nearest, number, resolved, value_of
 from glshade.errors import figure
-from glshade.image.layers import AOVS
+from glshade.image.layers import AOVS, PNG_AOVS, LayerFormat
 from glshade.limits import Limits
 
 # The largest side of a picture [pixels]. A row of 2^17 pixels of 16 bytes is 2 MiB, which other programs can still open.
@@ -94,6 +94,14 @@ class Film(Document):
         None, description="OpenColorIO configuration, a file or ocio://NAME; left out: $OCIO, else OpenColorIO's default"
     )
     aovs: tuple[Aov, ...] = Field((), description="layers that are made beside the picture; docs/layers.md describes each")
+    aov_format: LayerFormat = Field("exr", description="exr: layers in float32; png: a PNG file of codes for each layer")
+    depth_scale: Annotated[Finite, Field(gt=0)] | None = Field(
+        None,
+        description="depth that one code of a PNG stands for [scene units]; left out: 1, 2 or 5 times a power of 10, as fits",
+    )
+    categories: tuple[str, ...] = Field(
+        (), description="categories in the order of their numbers, from 1; left out: those of the scene's objects"
+    )
 
     @classmethod
     def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:
@@ -102,6 +110,11 @@ class Film(Document):
             (width, height), (x, y, w, h) = size, crop
             if x + w > width or y + h > height:
                 yield ("crop",), f"reaches to {x + w}, {y + h}, beyond the picture, which is {width} x {height}"
+        aovs = value_of(data, "aovs")
+        if value_of(data, "aov_format") == "png" and isinstance(aovs, list | tuple):
+            for index, aov in enumerate(aovs):
+                if aov in AOVS and aov not in PNG_AOVS:
+                    yield ("aovs", index), f"{aov} cannot be stored as PNG, only {', '.join(PNG_AOVS)} can: use exr"
         transformed = value_of(data, "view") is not None or value_of(data, "display") is not None
         if value_of(data, "ocio") is not None and not transformed:
             yield ("ocio",), "has no effect without a view or a display"

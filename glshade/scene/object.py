@@ -162,6 +162,9 @@ class Object(Document):
         "auto",
         description="front: back faces are culled; both: where the back is seen, the normal is reversed; auto: front if closed",
     )
+    category: str | None = Field(
+        None, description="kind of the object in data sets: for the layer semantic_id and --coco; left out: the object's name"
+    )
     vertex_colours: bool = Field(True, description="whether the mesh's vertex colours multiply the base colour")
     file_lights: bool = Field(
         False,

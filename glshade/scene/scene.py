@@ -41,6 +41,15 @@ def _sized(film: Film, camera: Camera) -> Film:
     return Film.model_construct(film.model_fields_set, **{**dict(film), "size": (camera.width, camera.height)})
 
 
+def _is_shared(value: Any, other: Any) -> bool:
+    """Returns whether two values are the same object, or tuples or tables of the same objects."""
+    if isinstance(value, dict) and isinstance(other, dict):
+        return value.keys() == other.keys() and all(item is other[key] for key, item in value.items())
+    if isinstance(value, tuple) and isinstance(other, tuple):
+        return len(value) == len(other) and all(a is b for a, b in zip(value, other, strict=True))
+    return value is other
+
+
 def _is_in(name: Any, names: set[str]) -> bool:
     """Returns whether a value that should be a name is one of these names."""
     return isinstance(name, str) and name in names
@@ -108,6 +117,12 @@ class Scene(Document):
         A calibrated camera brings its own size of the picture, unless the scene's film has one.
         """
         return self.model_copy(update={"camera": camera, "film": _sized(self.film, camera)})
+
+    def differs_in_camera(self, other: "Scene") -> bool:
+        """Returns whether two scenes share all values that a picture depends on, apart from the camera."""
+        keys = ("film", "materials", "objects", "lights", "quality")
+        same = all(_is_shared(getattr(self, key), getattr(other, key)) for key in keys)
+        return same and self._limits == other._limits and self._models is other._models
 
     def quality_of(self, item: Object) -> Quality:
         """Returns the quality with which an object is drawn: its own, over the scene's."""

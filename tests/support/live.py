@@ -130,7 +130,7 @@ class FakeWatcher:
         self.queue: asyncio.Queue[set[Path] | None] = asyncio.Queue()
         self.paths: list[Path] = []
 
-    def watch(self, paths: Iterable[Path]) -> None:
+    def watch(self, paths: Iterable[Path], since: float = 0.0) -> None:
         self.paths = list(paths)
 
     async def changes(self) -> AsyncIterator[set[Path]]:

@@ -32,8 +32,8 @@ class CameraFormat:
     def read(self, path: Path) -> list[CalibratedPicture]:
         """Returns the pictures of a file or folder.
 
-        Errors: AssetError, one line that starts with the path. KeyError, TypeError, ValueError or IndexError where the file has
-        another form, which `read` of glshade/calibration/file.py turns into an AssetError.
+        Errors: AssetError, one line that starts with the path. KeyError for a key that is missing, or OSError, which `read` of
+        glshade/calibration/file.py turns into an AssetError.
         """
         raise NotImplementedError
 

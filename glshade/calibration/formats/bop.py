@@ -15,8 +15,8 @@ import numpy as np
 from glshade.arrays import Float64
 from glshade.calibration.calibration import CalibratedPicture
 from glshade.calibration.formats import CameraFormat
-from glshade.calibration.reading import camera, table
-from glshade.calibration.rotation import FLIPPED, inverse_pose, pose_of
+from glshade.calibration.reading import at, camera, numbers, pinhole, pose, table
+from glshade.calibration.rotation import FLIPPED, inverse_pose
 from glshade.errors import AssetError
 
 # Millimetres in a scene unit, which counts as a metre.
@@ -33,37 +33,40 @@ class Bop(CameraFormat):
         poses: dict[str, Any] = {}
         # An object has the same number in all pictures. BOP counts from 1.
         names = dict.fromkeys(name for picture in pictures for name in picture.calibration.objects)
-        numbers = {name: number for number, name in enumerate(names, 1)}
+        ids = {name: number for number, name in enumerate(names, 1)}
         for index, picture in enumerate(pictures):
             seen = picture.calibration
-            pose = seen.camera_from_world
+            view = seen.camera_from_world
             cameras[str(index)] = {
                 "cam_K": seen.matrix.reshape(-1).tolist(),
-                "cam_R_w2c": pose[:3, :3].reshape(-1).tolist(),
-                "cam_t_w2c": (pose[:3, 3] * MILLIMETRES).tolist(),
+                "cam_R_w2c": view[:3, :3].reshape(-1).tolist(),
+                "cam_t_w2c": (view[:3, 3] * MILLIMETRES).tolist(),
                 "depth_scale": 1.0,
                 "width": seen.size[0],
                 "height": seen.size[1],
                 "file": picture.name,
             }
-            poses[str(index)] = [_pose(pose @ placed, numbers[name], name) for name, placed in seen.objects.items()]
+            poses[str(index)] = [_pose(view @ placed, ids[name], name) for name, placed in seen.objects.items()]
         return {"scene_camera.json": _lines(cameras), "scene_gt.json": _lines(poses)}
 
     def read(self, path: Path) -> list[CalibratedPicture]:
         found = []
         where = path / "scene_camera.json"
-        for number, row in sorted(table(where).items(), key=lambda item: int(item[0])):
+        for number, row in sorted(table(where).items(), key=lambda item: (len(item[0]), item[0])):
+            if not isinstance(row, dict):
+                raise AssetError(f"{where}: {number}: must be a table with cam_K, cam_R_w2c and cam_t_w2c")
             name = str(row.get("file", number))
             if "cam_R_w2c" not in row:
                 raise AssetError(
                     f"{where}: {name}: cam_R_w2c and cam_t_w2c are missing, so the camera has no place in the world"
                 )
-            rotation = np.array(row["cam_R_w2c"], dtype=np.float64).reshape(3, 3)
-            pose = inverse_pose(pose_of(rotation, np.array(row["cam_t_w2c"]) / MILLIMETRES, f"{where}: {name}")) @ FLIPPED
-            fx, _, cx, _, fy, cy, *_ = row["cam_K"]
-            # Other programs leave the size out. The principal point lies near the middle of a picture.
-            size = int(row.get("width", round(2 * cx))), int(row.get("height", round(2 * cy)))
-            found.append(CalibratedPicture(name, camera("perspective", size, (fx, fy, cx, cy), pose)))
+            with at(where, name):
+                moved = numbers(row["cam_t_w2c"], (3,), "cam_t_w2c") / MILLIMETRES
+                placed = inverse_pose(pose(row["cam_R_w2c"], moved, where, name)) @ FLIPPED
+                intrinsics = pinhole(row["cam_K"], "cam_K")
+                # Other programs leave the size out. The principal point lies near the middle of a picture.
+                size = row.get("width", round(2 * intrinsics[2])), row.get("height", round(2 * intrinsics[3]))
+                found.append(CalibratedPicture(name, camera("perspective", size, intrinsics, placed)))
         return found
 
     def recognises(self, path: Path) -> bool:

@@ -9,12 +9,10 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import ClassVar
 
-import numpy as np
-
 from glshade.calibration.calibration import CalibratedPicture
 from glshade.calibration.formats import CameraFormat
-from glshade.calibration.reading import camera, text
-from glshade.calibration.rotation import FLIPPED, inverse_pose, pose_of, quaternion, rotation_of
+from glshade.calibration.reading import Fault, at, camera, number, numbers, pixels, pose, text
+from glshade.calibration.rotation import FLIPPED, inverse_pose, quaternion, rotation_of
 from glshade.errors import AssetError
 
 # camera model -> the number of its parameters that are focal lengths, for the models whose other parameters, after cx and cy,
@@ -25,6 +23,7 @@ FOCAL = {
     "SIMPLE_RADIAL": 1,
     "RADIAL": 1,
     "OPENCV": 2,
+    "FULL_OPENCV": 2,
 }
 
 
@@ -34,19 +33,19 @@ class Colmap(CameraFormat):
     folder: ClassVar[bool] = True
 
     def texts(self, pictures: Sequence[CalibratedPicture]) -> dict[str, str]:
-        numbers: dict[str, int] = {}
+        known: dict[str, int] = {}
         cameras = ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]"]
         images = ["# IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME", "# POINTS2D[] as (X, Y, POINT3D_ID)"]
         for index, picture in enumerate(pictures, 1):
             seen = picture.calibration
             intrinsics = f"PINHOLE {seen.size[0]} {seen.size[1]} {seen.fx!r} {seen.fy!r} {seen.cx!r} {seen.cy!r}"
-            if intrinsics not in numbers:
-                numbers[intrinsics] = len(numbers) + 1
-                cameras.append(f"{numbers[intrinsics]} {intrinsics}")
-            pose = seen.camera_from_world
-            values = " ".join(repr(float(x)) for x in (*quaternion(pose[:3, :3]), *pose[:3, 3]))
+            if intrinsics not in known:
+                known[intrinsics] = len(known) + 1
+                cameras.append(f"{known[intrinsics]} {intrinsics}")
+            view = seen.camera_from_world
+            values = " ".join(repr(float(x)) for x in (*quaternion(view[:3, :3]), *view[:3, 3]))
             # The line of points that follows each image is empty.
-            images += [f"{index} {values} {numbers[intrinsics]} {picture.name}", ""]
+            images += [f"{index} {values} {known[intrinsics]} {picture.name}", ""]
         return {
             "cameras.txt": "\n".join(cameras) + "\n",
             "images.txt": "\n".join(images) + "\n",
@@ -54,22 +53,25 @@ class Colmap(CameraFormat):
         }
 
     def read(self, path: Path) -> list[CalibratedPicture]:
-        cameras: dict[str, tuple[tuple[int, int], tuple[float, ...]]] = {}
-        for line in _lines(path / "cameras.txt"):
-            number, model, width, height, *values = line.split()
-            cameras[number] = (int(width), int(height)), _numbers(path, number, model, [float(x) for x in values])
-        found = []
-        # Every other line lists the points of an image, and may be empty.
-        for line in list(_lines(path / "images.txt", keep_empty=True))[::2]:
-            if not line:
-                continue
-            _, *values, number, name = line.split(None, 9)
+        # A camera counts only if a picture was taken by it.
+        cameras = {number: words for number, *words in map(str.split, _lines(path / "cameras.txt"))}
+        where, found = path / "images.txt", []
+        for line in _images(where):
+            _, *values, number, name = words = line.split(None, 9)
+            if len(words) < 10:
+                raise AssetError(
+                    f"{where}: an image needs IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID and NAME: {line[:80]}"
+                )
             if number not in cameras:
-                raise AssetError(f"{path / 'images.txt'}: {name}: cameras.txt has no camera {number}")
-            w, x, y, z, *t = map(float, values)
-            pose = inverse_pose(pose_of(rotation_of([w, x, y, z]), np.array(t), f"{path}: {name}")) @ FLIPPED
-            size, intrinsics = cameras[number]
-            found.append(CalibratedPicture(name, camera("perspective", size, intrinsics, pose)))
+                raise AssetError(f"{where}: {name}: cameras.txt has no camera {number}")
+            with at(path / "cameras.txt", f"camera {number}"):
+                size, intrinsics = _numbers(cameras[number])
+            with at(where, name):
+                turn = numbers(values[:4], (4,), "the quaternion")
+                if not turn.any():
+                    raise Fault("the quaternion must not be 0")
+                placed = inverse_pose(pose(rotation_of(turn), values[4:], where, name)) @ FLIPPED
+                found.append(CalibratedPicture(name, camera("perspective", size, intrinsics, placed)))
         return found
 
     def recognises(self, path: Path) -> bool:
@@ -78,14 +80,33 @@ class Colmap(CameraFormat):
         return (path / "cameras.txt").is_file()
 
 
-def _numbers(path: Path, number: str, model: str, values: list[float]) -> tuple[float, ...]:
-    """Returns fx, fy, cx and cy of a camera. Errors: AssetError for a lens that is distorted."""
+def _numbers(words: Sequence[str]) -> tuple[tuple[int, int], tuple[float, ...]]:
+    """Returns the size, and fx, fy, cx and cy, of a camera.
+
+    words: MODEL, WIDTH, HEIGHT and PARAMS, as in cameras.txt.
+    Errors: Fault, also for a lens that is distorted.
+    """
+    if len(words) < 3:
+        raise Fault("needs MODEL, WIDTH, HEIGHT and PARAMS")
+    model, width, height, *texts = words
     if model not in FOCAL:
-        raise AssetError(f"{path / 'cameras.txt'}: camera {number}: the model {model} cannot be drawn; PINHOLE can")
-    count = FOCAL[model]
+        raise Fault(f"the model {model} cannot be drawn; PINHOLE can")
+    count, values = FOCAL[model], [number(text, "each parameter") for text in texts]
+    if len(values) < count + 2:
+        raise Fault(f"the model {model} needs {count + 2} parameters or more, not {len(values)}")
     if any(values[count + 2 :]):
-        raise AssetError(f"{path / 'cameras.txt'}: camera {number}: its lens is distorted, which cannot be drawn; undistort it")
-    return (values[0], values[count - 1], values[count], values[count + 1])
+        raise Fault("its lens is distorted, which cannot be drawn; undistort it")
+    size = pixels(width, "the width"), pixels(height, "the height")
+    return size, (values[0], values[count - 1], values[count], values[count + 1])
+
+
+def _images(path: Path) -> Iterator[str]:
+    """Yields the lines of images.txt that describe images. The line after each lists its points, and may be empty."""
+    lines = _lines(path, keep_empty=True)
+    for line in lines:
+        if line:
+            yield line
+            next(lines, None)
 
 
 def _lines(path: Path, keep_empty: bool = False) -> Iterator[str]:

@@ -11,13 +11,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, ClassVar
 
-import numpy as np
-
-from glshade.calibration.calibration import CalibratedPicture
+from glshade.calibration.calibration import CalibratedPicture, Calibration
 from glshade.calibration.formats import CameraFormat
-from glshade.calibration.reading import camera, table
-from glshade.calibration.rotation import pose_of
-from glshade.errors import AssetError
+from glshade.calibration.reading import Fault, at, camera, number, numbers, pixels, pose, rows, table
 
 # The names of nerfstudio's camera models that have no distortion.
 MODELS = {"perspective": "PINHOLE", "orthographic": "ORTHOPHOTO"}
@@ -60,51 +56,66 @@ class Nerf(CameraFormat):
         return {"": json.dumps({**common, "frames": frames}, indent=1) + "\n"}
 
     def read(self, path: Path) -> list[CalibratedPicture]:
-        data = table(path)
-        found = []
-        for frame in data["frames"]:
-            values = {**data, **frame}
-            name = str(frame["file_path"])
-            if any(values.get(key) for key in DISTORTIONS):
-                raise AssetError(f"{path}: {name}: its lens is distorted, which cannot be drawn; undistort the pictures")
-            model = values.get("camera_model", MODELS["perspective"])
-            kind = next((kind for kind, known in MODELS.items() if known == model), "perspective")
-            if kind == "perspective" and model not in ("PINHOLE", "OPENCV", "SIMPLE_PINHOLE"):
-                raise AssetError(f"{path}: {name}: the camera model {model} cannot be drawn; PINHOLE can")
-            width, height = _size(values, path, name)
-            fx = values.get("fl_x") or _focal(width, values.get("camera_angle_x"))
-            fy = values.get("fl_y") or (_focal(height, values["camera_angle_y"]) if "camera_angle_y" in values else fx)
-            if not fx:
-                raise AssetError(f"{path}: {name}: fl_x and camera_angle_x are both missing")
-            numbers: tuple[Any, ...] = (fx, fy, values.get("cx", width / 2), values.get("cy", height / 2))
-            rows = np.array(frame["transform_matrix"], dtype=np.float64)[:3]
-            found.append(
-                CalibratedPicture(
-                    name, camera(kind, (width, height), numbers, pose_of(rows[:, :3], rows[:, 3], f"{path}: {name}"), values)
-                )
-            )
+        data, found = table(path), []
+        for index, frame in enumerate(rows(data, "frames", path)):
+            # A key without a value counts as left out.
+            values = {key: value for key, value in {**data, **frame}.items() if value is not None}
+            name = str(frame.get("file_path", index))
+            with at(path, name):
+                found.append(CalibratedPicture(name, _camera(values, path, name)))
         return found
 
     def recognises(self, path: Path) -> bool:
         return path.suffix.lower() == ".json" and path.is_file() and "frames" in table(path)
 
 
+def _camera(values: dict[str, Any], path: Path, name: str) -> Calibration:
+    """Returns the camera of a frame. Errors: Fault; KeyError for a key that is missing; AssetError."""
+    if any(number(values.get(key, 0), key) for key in DISTORTIONS):
+        raise Fault("its lens is distorted, which cannot be drawn; undistort the pictures")
+    model = "fisheye" if values.get("is_fisheye") else values.get("camera_model", MODELS["perspective"])
+    kind = next((kind for kind, known in MODELS.items() if known == model), "perspective")
+    if kind == "perspective" and model not in ("PINHOLE", "OPENCV", "SIMPLE_PINHOLE"):
+        raise Fault(f"the camera model {model} cannot be drawn; PINHOLE can")
+    width, height = _size(values, path, name)
+    across, down = _focal(values, "fl_x", "camera_angle_x", width), _focal(values, "fl_y", "camera_angle_y", height)
+    fx, fy = across or down, down or across
+    if not fx:
+        raise Fault("fl_x and camera_angle_x are both missing")
+    matrix = values["transform_matrix"]
+    if isinstance(matrix, list) and len(matrix) == 3:
+        matrix = [*matrix, [0.0, 0.0, 0.0, 1.0]]
+    placed = numbers(matrix, (4, 4), "transform_matrix")
+    intrinsics = (fx, fy, values.get("cx", width / 2), values.get("cy", height / 2))
+    return camera(kind, (width, height), intrinsics, pose(placed[:3, :3], placed[:3, 3], path, name), values)
+
+
 def _size(values: dict[str, Any], path: Path, name: str) -> tuple[int, int]:
     """Returns width and height of a picture [pixels]: those of the table, or else those of the picture itself.
 
-    Errors: AssetError where neither tells them.
+    Errors: Fault where neither tells them.
     """
     if "w" in values and "h" in values:
-        return int(values["w"]), int(values["h"])
+        return pixels(values["w"], "w"), pixels(values["h"], "h")
     import OpenImageIO as oiio
 
     for picture in (path.parent / name, path.parent / f"{name}.png"):
         opened = oiio.ImageInput.open(str(picture)) if picture.is_file() else None
         if opened is not None:
             return opened.spec().width, opened.spec().height
-    raise AssetError(f"{path}: {name}: w and h are missing, and there is no such picture whose size could be read")
+    raise Fault("w and h are missing, and there is no such picture whose size could be read")
 
 
-def _focal(width: float, angle: float | None) -> float | None:
-    """Returns the focal length of a picture that spans an angle; None without an angle. The angle is in radians."""
-    return None if angle is None else width / (2 * math.tan(float(angle) / 2))
+def _focal(values: dict[str, Any], length: str, angle: str, side: int) -> float | None:
+    """Returns a focal length [pixels] by its own key, or else by that of the angle that a side of the picture spans [radians].
+
+    Returns None where neither key is there. Errors: Fault.
+    """
+    if values.get(length):
+        return number(values[length], length)
+    if angle not in values:
+        return None
+    spanned = number(values[angle], angle)
+    if not 0 < spanned < math.pi:
+        raise Fault(f"{angle} must lie between 0 and pi, not {spanned:g}")
+    return side / (2 * math.tan(spanned / 2))

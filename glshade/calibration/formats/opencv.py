@@ -12,8 +12,8 @@ from typing import ClassVar
 
 from glshade.calibration.calibration import CalibratedPicture
 from glshade.calibration.formats import CameraFormat
-from glshade.calibration.reading import camera, table
-from glshade.calibration.rotation import FLIPPED, inverse_pose, pose_of
+from glshade.calibration.reading import at, camera, pinhole, pose, rows, table
+from glshade.calibration.rotation import FLIPPED, inverse_pose
 
 
 class Opencv(CameraFormat):
@@ -22,10 +22,10 @@ class Opencv(CameraFormat):
     orthographic: ClassVar[bool] = True
 
     def texts(self, pictures: Sequence[CalibratedPicture]) -> dict[str, str]:
-        rows = []
+        table_rows = []
         for picture in pictures:
             seen = picture.calibration
-            rows.append(
+            table_rows.append(
                 {
                     "file": picture.name,
                     "type": seen.kind,
@@ -42,18 +42,18 @@ class Opencv(CameraFormat):
         told = {
             "convention": "x = K (R X + t), divided by its third number if the type is perspective; "
             "pixels are counted from the top left corner, so that the middle of the first pixel is (0.5, 0.5)",
-            "pictures": rows,
+            "pictures": table_rows,
         }
         return {"": json.dumps(told, indent=1) + "\n"}
 
     def read(self, path: Path) -> list[CalibratedPicture]:
         found = []
-        for row in table(path)["pictures"]:
-            k = row["K"]
-            pose = inverse_pose(pose_of(row["R"], row["t"], f"{path}: {row['file']}")) @ FLIPPED
-            numbers = (k[0][0], k[1][1], k[0][2], k[1][2])
-            size = int(row["width"]), int(row["height"])
-            found.append(CalibratedPicture(str(row["file"]), camera(row.get("type", "perspective"), size, numbers, pose, row)))
+        for index, row in enumerate(rows(table(path), "pictures", path)):
+            name = str(row.get("file", index))
+            with at(path, name):
+                placed = inverse_pose(pose(row["R"], row["t"], path, name)) @ FLIPPED
+                size, kind = (row["width"], row["height"]), row.get("type", "perspective")
+                found.append(CalibratedPicture(name, camera(kind, size, pinhole(row["K"], "K"), placed, row)))
         return found
 
     def recognises(self, path: Path) -> bool:

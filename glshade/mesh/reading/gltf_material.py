@@ -128,8 +128,10 @@ class _Converter:
         return self.given.table("extensions")
 
     def warn(self, message: str) -> None:
-        """Adds a warning that names the material."""
-        self.file.warn(f"material '{short(self.given.text('name', ''))}': {message}")
+        """Adds a warning that names the material, or its place in the file where it has no name."""
+        name = self.given.text("name", "")
+        subject = f"material '{short(name)}'" if name else self.given.place
+        self.file.warn(f"{subject}: {message}")
 
     def converted(self) -> Material:
         """Returns the material table."""

@@ -64,6 +64,11 @@ def plain(material: Material, paths: set[str] | None = None) -> Material:
     return result
 
 
+def unplaced(name: str) -> str:
+    """Returns the warning about a part without texture coordinates whose material has textures."""
+    return f"{name} has no texture coordinates; drawn without the textures of its material"
+
+
 def _white(texture: dict[str, Any]) -> Any:
     """Returns the value of a texture's parameter where the picture is white."""
     factor, added = texture.get("factor", 1.0), texture.get("add", 0.0)

@@ -248,8 +248,8 @@ def test_a_batch_writes_and_reads_cameras(
         ('{"w": 4, "h": 4, "frames": [{"file_path": "a", "fl_x": 1}]}', "'transform_matrix' is missing"),
         ('{"w": 4, "h": 4, "frames": [{"file_path": "a", "fl_x": 1, "k1": 0.1}]}', "a: its lens is distorted"),
         ('{"w": 4, "h": 4, "frames": [{"file_path": "a", "fl_x": 1, "camera_model": "EQUIRECTANGULAR"}]}', "EQUIRECTANGULAR"),
-        ('{"w": 4, "h": 4, "frames": [{"file_path": "a", "fl_x": 1, "transform_matrix": [[0]]}]}', "nerf"),
-        ('{"pictures": [{"file": "a", "K": [1]}]}', "opencv"),
+        ('{"w": 4, "h": 4, "frames": [{"file_path": "a", "fl_x": 1, "transform_matrix": [[0]]}]}', "16 finite numbers"),
+        ('{"pictures": [{"file": "a", "K": [1]}]}', "a: 'R' is missing"),
         ('{"other": 1}', "in a format that is known"),
     ],
 )

@@ -38,7 +38,7 @@ def scene(cosine: float, rate: str) -> Scene:
     material = {"brdf": "phong", "kd": 0.0, "ks": 1.0, "exponent": 1.0}
     return Scene.model_validate(
         {
-            "objects": [{"mesh": mesh, "material": material, "shading": rate}],
+            "objects": [{"mesh": mesh, "material": material, "shading": rate, "sides": "front"}],
             "lights": [lamp],
             "camera": {"type": "orthographic", "eye": (0, 0, 5), "target": (0, 0, 0), "height": 1},
             "film": {"size": (2, 2)},
