@@ -6,13 +6,15 @@ import json
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from glshade.batch.task import Task
 from glshade.calibration import file as camera_file
 from glshade.calibration.calibration import CAMERA, CalibratedPicture, Calibration
 from glshade.image import file as picture_file
-XX
+
+if TYPE_CHECKING:
+    from glshade.scene.scene import Scene
 
 
 def check(path: Path, name: str, scenes: Mapping[str, Scene]) -> None:

@@ -25,13 +25,14 @@ def instances(scene: Scene, numbers: NDArray[Any]) -> dict[str, Any]:
     numbers: (H, W), the index of the object in each pixel, -1 for none.
     Errors: SceneError for an object whose category the film's list lacks.
     """
-    from glshade.image.masks import masks
+    from glshade.image.masks import object_masks
     from glshade.scene import labels
 
     names, categories = labels.names(scene), labels.object_categories(scene)
     labels.categories(scene)
     shown = [
-        {"name": names[number - 1], "category": categories[number - 1], **mask} for number, mask in masks(numbers + 1).items()
+        {"name": names[number - 1], "category": categories[number - 1], **mask}
+        for number, mask in object_masks(numbers + 1).items()
     ]
     height, width = numbers.shape
     return {"width": width, "height": height, "categories": list(scene.film.categories), "objects": shown}

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from glshade.files import beside
+from glshade.image.layer_paths import PNG_AOVS, layer_files, layers_path
 
 # The process id in a temporary file's name, which `files.beside` puts before the suffix: .NAME.PROCESS.png.
 NUMBER = re.compile(r"\.(\d+)(?=\.\w+$)")
@@ -15,9 +16,6 @@ NUMBER = re.compile(r"\.(\d+)(?=\.\w+$)")
 
 def remove(outputs: Iterable[str | Path]) -> None:
     """Removes temporary files beside these picture files, if their processes have ended. Each folder is listed only once."""
-    # This import is late, because it imports NumPy. A pool starts its workers before the slow import of NumPy.
-    from glshade.image.layers import PNG_AOVS, layer_files, layers_path
-
     folders: dict[Path, set[str]] = {}
     for output in map(Path, outputs):
         names = folders.setdefault(output.parent, set())

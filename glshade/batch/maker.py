@@ -252,7 +252,7 @@ def _files(task: Task, scene: Scene) -> list[Path]:
     output = Path(task.output)
     if not scene.film.aovs:
         return [output]
-    from glshade.image.layers import layer_files
+    from glshade.image.layer_paths import layer_files
 
     return [output, *layer_files(output, scene.film.aovs, scene.film.aov_format)]
 

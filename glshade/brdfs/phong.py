@@ -74,7 +74,10 @@ def with_half_angle(material: Any, model: str) -> Brdf:
     The angle between n and h is about half the angle between r and v, so the exponent becomes four times as large.
     """
     p = material.exponent
-    fourfold = p.model_copy(update={key: tuple(4 * x for x in getattr(p, key)) for key in ("factor", "add")}) if isinstance(p, Texture) else min(4 * p, 1e8)
+    if isinstance(p, Texture):
+        fourfold = p.model_copy(update={key: tuple(4 * x for x in getattr(p, key)) for key in ("factor", "add")})
+    else:
+        fourfold = min(4 * p, 1e8)
     values = {name: getattr(material, name) for name in type(material).model_fields}
     return BRDFS[model].model_construct(**{**values, "brdf": model, "exponent": fourfold})
 

@@ -82,9 +82,9 @@ def read(path: Path) -> list[CalibratedPicture]:
         raise AssetError(f"{path}: there is no such file or folder")
     for name, format_class in FORMATS.items():
         reader = format_class()
-        if not reader.recognises(path):
-            continue
         try:
+            if not reader.recognises(path):
+                continue
             found = reader.read(path)
         except KeyError as error:
             raise AssetError(f"{path}: is not a readable file of cameras in the format {name}: {error} is missing") from None

@@ -22,6 +22,9 @@ from glshade.limits import LARGEST_CAMERAS
 # The longest side of a picture that a camera may describe [pixels]. Whether it can be drawn is decided later, by the film.
 MOST_PIXELS = 1_000_000
 
+# Reading this many cameras takes ten seconds. A file of more is refused before they are understood.
+MOST_CAMERAS = 100_000
+
 
 class Fault(ValueError):
     """What is wrong with a part of a file, in words for its reader, without the place."""
@@ -71,7 +74,14 @@ def rows(data: Mapping[str, Any], key: str, path: Path) -> list[dict[str, Any]]:
     found = data[key]
     if not isinstance(found, list) or not all(isinstance(row, dict) for row in found):
         raise AssetError(f'{path}: "{key}" must be a list of tables, one for each picture')
+    check_count(len(found), path)
     return found
+
+
+def check_count(count: int, path: Path) -> None:
+    """Refuses a file of too many cameras. Errors: AssetError."""
+    if count > MOST_CAMERAS:
+        raise AssetError(f"{path}: holds {count:,} cameras; {MOST_CAMERAS:,} can be read, so divide the file")
 
 
 def number(value: Any, key: str) -> float:

@@ -104,7 +104,8 @@ def _devices() -> dict[str, Any]:
     from dataclasses import asdict
 
     from glshade.errors import GlshadeError
-    from glshade.gl.context import LIBEGL, devices
+    from glshade.gl.context import devices
+    from glshade.gl.egl import LIBEGL
 
     if not sys.platform.startswith("linux"):
         return {"library": None, "problem": "not used on this platform", "devices": []}

@@ -25,7 +25,7 @@ from glshade.image.image import Image
 from glshade.image.srgb import linear_to_srgb
 from glshade.lru import Lru
 from glshade.radiance.readying import ready
-from glshade.scene.camera import window
+from glshade.scene.camera import Camera, window
 from glshade.scene.digest import scene_digest
 from glshade.scene.models import Folders, paths, use_models
 from glshade.scene.object import Rate
@@ -111,6 +111,33 @@ class Renderer:
         with self.context.gl:
             self.context.gl.gc()
             return self._render(scene, dtype, shading, tile)
+
+    def render_many(
+        self, scene: Scene, cameras: Iterable[Camera | str], *, dtype: DType = "uint8", shading: Rate | None = None
+    ) -> NDArray[Any]:
+        """Returns the pictures (N, H, W, 3 or 4) of a scene through N cameras, each as `render` returns it.
+
+        The pictures are drawn one after another; what does not depend on the camera is prepared once.
+
+        scene: the scene to draw.
+        cameras: cameras, or names of the scene's `cameras`. All pictures must have one size.
+        dtype, shading: as for `render`.
+        Errors: ValueError for no cameras, and for pictures of several sizes; KeyError for a name that the scene does not have;
+        SceneError, ShaderError.
+        """
+        pictures: NDArray[Any] | None = None
+        chosen = [scene.cameras[camera] if isinstance(camera, str) else camera for camera in cameras]
+        with self.context.gl:
+            for number, camera in enumerate(chosen):
+                pixels = self.render(scene.through(camera), dtype=dtype, shading=shading).pixels
+                if pictures is None:
+                    pictures = np.empty((len(chosen), *pixels.shape), dtype=pixels.dtype)
+                if pixels.shape != pictures.shape[1:]:
+                    raise ValueError(f"camera {number} gives a picture of another size; set the film's size for all")
+                pictures[number] = pixels
+        if pictures is None:
+            raise ValueError("there are no cameras")
+        return pictures
 
     def layers(self, scene: Scene, *, dtype: DType = "float32", shading: Rate | None = None, tile: int | None = None) -> Layers:
         """Returns the picture of a scene with the layers that its film asks for (`aovs`). Arguments and errors as

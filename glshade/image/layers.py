@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from glshade.image.layer_paths import LayerFormat, layers_path
 
 if TYPE_CHECKING:
     from glshade.image.image import Image
@@ -33,9 +35,6 @@ AOVS = (
     "mask",
     "cryptomatte",
 )
-# The layers that can be stored as PNG: those whose values have a natural range of codes.
-PNG_AOVS = ("depth", "normal", "view_normal", "object_id", "material_id", "semantic_id", "mask")
-LayerFormat = Literal["exr", "png"]
 # The channel letters of layers that are not colours. Compositing programs expect Z for a depth, XYZ for a vector and UV for
 # texture coordinates; I for an index is Mitsuba's.
 CHANNELS = {
@@ -93,9 +92,9 @@ class Layers:
         path = Path(path)
         picture = replace(self.image, attributes={**self.image.attributes, **(attributes or {})})
         if self.form == "png" and self.arrays:
-            from glshade.image.png_layers import write
+            from glshade.image.png_layers import Coding, write
 
-            write(path, self, picture)
+            write(path, self.arrays, Coding(self.depth_scale, self.legends), picture)
             picture.save(path)
             return
         if format_of(path).layers and self.arrays:
@@ -123,37 +122,6 @@ class Layers:
             whole=picture.whole,
         )
         write(path, contents)
-
-
-def layers_path(path: Path) -> Path:
-    """Returns the path of the separate file that stores a picture's layers if the picture's format cannot store them."""
-    return path.with_name(f"{path.stem}.aovs.exr")
-
-
-def layer_files(path: Path, aovs: Iterable[str], form: LayerFormat) -> list[Path]:
-    """Returns the separate files of a picture's layers, in the order in which they are written.
-
-    path: the picture's file.
-    aovs: the layers that the film asks for.
-    form: the format of the layers.
-    Errors: GlshadeError for a picture whose format is not known.
-    """
-    from glshade.image.file import format_of
-
-    aovs = tuple(dict.fromkeys(aovs))
-    if form == "png":
-        return [*(png_path(path, aov) for aov in aovs), *([legend_path(path)] if aovs else [])]
-    return [layers_path(path)] if aovs and not format_of(path).layers else []
-
-
-def png_path(path: Path, layer: str) -> Path:
-    """Returns the path of the PNG file of one of a picture's layers."""
-    return path.with_name(f"{path.stem}.{layer}.png")
-
-
-def legend_path(path: Path) -> Path:
-    """Returns the path of the file that says what the codes of a picture's layers in PNG files mean."""
-    return path.with_name(f"{path.stem}.aovs.json")
 
 
 def names_attribute(names: list[str]) -> str:

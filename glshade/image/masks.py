@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 
-def masks(numbers: NDArray[np.integer[Any]]) -> dict[int, dict[str, Any]]:
+def object_masks(numbers: NDArray[np.integer[Any]]) -> dict[int, dict[str, Any]]:
     """Returns number -> {"bbox": [x, y, width, height], "area": pixels, "counts": packed run lengths}, for each number above 0.
 
     numbers: (H, W), the number of the object in each pixel, 0 or less for none.
@@ -31,7 +31,7 @@ def masks(numbers: NDArray[np.integer[Any]]) -> dict[int, dict[str, Any]]:
 
 
 def _mask(first: NDArray[Any], length: NDArray[Any], height: int, size: int) -> dict[str, Any]:
-    """Returns what `masks` says of one number.
+    """Returns what `object_masks` says of one number.
 
     first, length: (N,) where each run begins, and its number of pixels.
     height: number of rows.

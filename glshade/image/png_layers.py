@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,11 +20,10 @@ from glshade.errors import GlshadeError
 from glshade.files import replacing
 from glshade.image.contents import PictureContents
 from glshade.image.file import write as write_file
-from glshade.image.layers import legend_path, png_path
+from glshade.image.layer_paths import legend_path, png_path
 
 if TYPE_CHECKING:
     from glshade.image.image import Image
-    from glshade.image.layers import Layers
 
 # The text of a PNG file that describes its layer, in JSON.
 LAYER = "glshade:layer"
@@ -35,15 +36,28 @@ ZERO, UNIT = 32768, 32767
 ROUND = (1, 2, 5, 10)
 
 
-def write(path: Path, layers: Layers, picture: Image) -> None:
+@dataclass(frozen=True)
+class Coding:
+    """How the values of layers become codes.
+
+    depth_scale: depth that one code stands for [scene units]; None chooses a round number that fits.
+    legends: name of a layer of numbers -> number -> what it stands for, as JSON types.
+    """
+
+    depth_scale: float | None = None
+    legends: Mapping[str, Mapping[int, Any]] = field(default_factory=dict)
+
+
+def write(path: Path, arrays: Mapping[str, NDArray[np.float32]], coding: Coding, picture: Image) -> None:
     """Writes the files of the layers of a picture: a PNG file for each, and the JSON file that describes them.
 
     path: the picture's file.
-    layers: the layers.
+    arrays: name -> (H, W, C), the layers.
+    coding: how their values become codes.
     picture: the picture, whose texts and camera the files repeat.
     Errors: GlshadeError for a number that 16 bits cannot hold, or a file that cannot be written.
     """
-    coded = {name: codes(path, name, array, layers) for name, array in layers.arrays.items()}
+    coded = {name: codes(path, name, array, coding) for name, array in arrays.items()}
     for name, (pixels, description) in coded.items():
         texts = {**picture.attributes, **picture.texts_of_camera, LAYER: json.dumps(description, separators=(",", ":"))}
         # "srgb" leaves out a statement about colours, which codes are not.
@@ -58,17 +72,17 @@ def write(path: Path, layers: Layers, picture: Image) -> None:
         raise GlshadeError(f"{target}: cannot be written: {error.strerror or error}") from None
 
 
-def codes(path: Path, name: str, array: NDArray[np.float32], layers: Layers) -> tuple[NDArray[Any], dict[str, Any]]:
+def codes(path: Path, name: str, array: NDArray[np.float32], coding: Coding) -> tuple[NDArray[Any], dict[str, Any]]:
     """Returns the codes (H, W, C) of a layer and its description, as JSON types.
 
     path: the picture's file, for messages.
     name: the layer, one of PNG_AOVS.
     array: its values (H, W, C).
-    layers: the scale of depths, and the legends.
+    coding: the scale of depths, and the legends.
     Errors: GlshadeError for a layer or a number that a PNG file cannot hold.
     """
     if name == "depth":
-        return _depth(path, array, layers.depth_scale)
+        return _depth(path, array, coding.depth_scale)
     if name == "mask":
         return (array * 255).astype(np.uint8), {"encoding": "255 where there is a surface"}
     if name in ("normal", "view_normal"):
@@ -76,10 +90,10 @@ def codes(path: Path, name: str, array: NDArray[np.float32], layers: Layers) -> 
         pixels = np.where(found, np.rint(array.astype(np.float64) * UNIT) + ZERO, 0)
         encoding = f"x, y, z = (code - {ZERO}) / {UNIT} in red, green, blue; 0, 0, 0 where there is no surface"
         return pixels.astype(np.uint16), {"encoding": encoding}
-    if name in layers.legends:
+    if name in coding.legends:
         if array.size and array.max() > MOST:
             raise GlshadeError(f"{path}: the layer {name} has more than {MOST:,} numbers, which PNG cannot hold: use exr")
-        legend = {str(number): told for number, told in layers.legends[name].items()}
+        legend = {str(number): told for number, told in coding.legends[name].items()}
         return array.astype(np.uint16), {"encoding": "number in the legend; 0 where there is no surface", "legend": legend}
     raise GlshadeError(f"{path}: the layer {name} cannot be stored as PNG: use exr")
 

@@ -111,6 +111,7 @@ class Mesh:
         positions: (V, 3). Vertices that no triangle uses are left out.
         triangles: (T, 3) integers, counter-clockwise seen from outside.
         normals: (V, 3) of any length. A zero, infinite or NaN normal is replaced by the smooth normal of its vertex.
+            If no normal has a direction, as in files of programs that write zeros, the mesh has no normals.
         uvs: (V, 2); v = 0 is the bottom of the picture.
         colours: (V, 4), linear Rec. 709 with straight alpha.
         smoothing: (T,) integers, for a mesh without normals. It gets normals that are smooth among the triangles with equal
@@ -155,7 +156,9 @@ class Mesh:
             neighbours=neighbours,
         )
         if arrays.normals is not None:
-            return mesh._with_given(arrays.normals, arrays.tangents)
+            n, length = normalised(arrays.normals)
+            if length.any():
+                return mesh._with_given(n, length == 0, arrays.tangents)
         if arrays.smoothing is None:
             return mesh
         numbers = arrays.smoothing if groups is None else np.concatenate([arrays.smoothing, groups])
@@ -163,13 +166,11 @@ class Mesh:
         made = split(mesh.with_neighbours(), attributes, len(mesh.triangles), lambda _: of_one_group(numbers))
         return gather(mesh, made.source, made.corners, normals=made.normals)
 
-    def _with_given(self, normals: Float64, tangents: Float64 | None) -> Mesh:
-        """Returns the mesh with the normals (V, 3) and tangents (V, 4) of a file, made unit and perpendicular.
+    def _with_given(self, n: Float64, lost: npt.NDArray[np.bool_], tangents: Float64 | None) -> Mesh:
+        """Returns the mesh with the unit normals (V, 3) and the tangents (V, 4) of a file, made unit and perpendicular.
 
-        Normals without a direction become smooth normals.
+        lost: (V,) which normals have no direction. They become smooth normals.
         """
-        n, length = normalised(normals)
-        lost = length == 0
         if lost.any():
             label = weld(self.positions)
             n[lost] = smooth_by_label(self, label[self.triangles.reshape(-1)], int(label.max()) + 1)[label[lost]]

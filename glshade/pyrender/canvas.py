@@ -19,8 +19,6 @@ if TYPE_CHECKING:
 
 Bytes = NDArray[np.uint8]
 Floats = NDArray[np.float32]
-# The number of samples in a pixel of pyrender's offscreen pictures.
-SAMPLES = 4
 # OpenGL enumerants that moderngl does not name.
 GL_READ_FRAMEBUFFER, GL_DRAW_FRAMEBUFFER, GL_DEPTH_BUFFER_BIT, GL_NEAREST = 0x8CA8, 0x8CA9, 0x100, 0x2600
 
@@ -91,19 +89,25 @@ class Canvas:
         self._resolved.read_into(pixels, components=channels, alignment=1)
         return np.ascontiguousarray(pixels[::-1])
 
-    def depth(self, view: View, unit: float) -> Floats:
+    def depth(self, view: View, unit: float, planes: tuple[float, float | None] | None = None) -> Floats:
         """Returns the distances (H, W) along the view axis [scene units], row 0 at the top. They are 0 where nothing is drawn.
 
         view: the view that the picture was drawn with.
         unit: the length of the view's unit [scene units].
+        planes: the near and the far plane with which pyrender converts depth as if the view were a perspective one; None for
+            the distance itself.
         """
         pixels = np.empty((self.size[1], self.size[0]), dtype=np.float32)
         self._resolved.read_into(pixels, attachment=-1, components=1, alignment=1, dtype="f4")
         d = np.ascontiguousarray(pixels[::-1])
         near, far = np.float32(view.near * unit), np.float32(view.far * unit)
         empty = d == 0
+        if planes is not None:
+            # An infinite far plane has the inverse 0.
+            nearest, inverse = np.float32(planes[0]), np.float32(1 / planes[1] if planes[1] else 0)
+            np.divide(nearest, d + (1 - d) * nearest * inverse, out=d, where=~empty)
         # Invert the projection, which maps the near plane to 1 and the far plane to 0.
-        if view.perspective:
+        elif view.perspective:
             d *= (far - near) / near
             d += 1
             np.divide(far, d, out=d)

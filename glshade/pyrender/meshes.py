@@ -47,13 +47,30 @@ def mesh(primitive: Any) -> Mesh | None:
     known = _meshes.get(primitive)
     if known is not None and all(map(operator.is_, known[0], sources)):
         return known[1]
-    triangles = _triangles(_order(primitive), primitive.mode)
+    triangles = corners(primitive)
+    positions = np.asarray(primitive.positions)
+    finite = np.isfinite(positions).all(axis=1)
+    if not finite.all():
+        triangles = triangles[finite[triangles].all(axis=1)]
+        # No triangle uses these vertices any more; 0 stands for numbers that a mesh must not have.
+        positions = np.where(finite[:, None], positions, 0)
     if not len(triangles):
         return None
     # As in glshade, texture coordinates start at the bottom left and vertex colours are linear.
-    result = Mesh.build(primitive.positions, triangles, primitive.normals, primitive.texcoord_0, primitive.color_0)
+    result = Mesh.build(positions, triangles, primitive.normals, primitive.texcoord_0, primitive.color_0)
     _meshes[primitive] = sources, result
     return result
+
+
+def corners(primitive: Any) -> Indices:
+    """Returns the vertices (T, 3) of all triangles of a primitive of triangles."""
+    return _triangles(_order(primitive), primitive.mode)
+
+
+def lost_triangles(primitive: Any) -> int:
+    """Returns how many triangles of a primitive of triangles have a corner that is not finite."""
+    finite = np.isfinite(primitive.positions).all(axis=1)
+    return 0 if finite.all() else int((~finite[corners(primitive)].all(axis=1)).sum())
 
 
 def _order(primitive: Any) -> Indices:

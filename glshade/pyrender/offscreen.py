@@ -45,6 +45,14 @@ NORMALS = RenderFlags.VERTEX_NORMALS | RenderFlags.FACE_NORMALS
 BLACK = (0.0, 0.0, 0.0, 1.0)
 
 
+# pyrender's users replace its shaders through `_renderer._program_cache`, most of them to draw normals or triangles.
+NO_SHADERS = (
+    "glshade has no pyrender shaders to replace (_renderer._program_cache): call normals(scene) for world normals, "
+    "faces(scene) for triangles, or render(scene, RenderFlags.SEG, ...) for segments"
+)
+CROWDED = "the scene has more than four lights of a kind, so pictures are brighter than pyrender's; most_lights=4 is its rule"
+
+
 class OffscreenRenderer:
     """Draws pyrender's scenes off screen, with the interface of pyrender.OffscreenRenderer."""
 
@@ -54,6 +62,8 @@ class OffscreenRenderer:
         viewport_height: int,
         point_size: float = 1.0,
         *,
+        samples: int = 4,
+        most_lights: int | None = None,
         backend: Any = "auto",
         device: int | None = None,
     ) -> None:
@@ -61,13 +71,19 @@ class OffscreenRenderer:
 
         viewport_width, viewport_height: the size of the pictures [pixels].
         point_size: the side of the squares that points become [pixels].
+        samples: the number of samples in a pixel, at most as many as the driver has; pyrender has 4.
+        most_lights: the number of lights of a kind that light an object, those nearest to it; 4 is pyrender's own rule. None
+            uses all lights.
         backend, device: the OpenGL context, as for glshade.Renderer.
-        Errors: ContextError.
+        Errors: ContextError; GlshadeError where `samples` or `most_lights` is less than 1.
         """
         from glshade.gl.renderer import Renderer
         from glshade.pyrender.painter import Painter
         from glshade.pyrender.scene import Conversion
 
+        self._samples, self._most_lights = _counted("samples", samples), most_lights
+        if most_lights is not None:
+            _counted("most_lights", most_lights)
         self.viewport_width = viewport_width
         self.viewport_height = viewport_height
         self.point_size = point_size
@@ -116,23 +132,15 @@ class OffscreenRenderer:
             colour.
         Errors: SceneError; GlshadeError after `delete` or where the viewport is larger than the driver allows.
         """
-        from glshade.pyrender.canvas import SAMPLES
-        from glshade.pyrender.scene import AS_THEY_ARE, Look, lights, main_camera, screen
+        from glshade.pyrender.scene import AS_THEY_ARE, Look, crowded, lights, screen
 
-        if self._painter is None:
-            raise GlshadeError("this OffscreenRenderer was deleted; create another")
+        painter, size, camera = self._begin(scene)
         wanted = RenderFlags(int(flags))
         depth_only, segmented = RenderFlags.DEPTH_ONLY in wanted, RenderFlags.SEG in wanted
         if wanted & RenderFlags.SHADOWS_ALL and not (depth_only or segmented):
             self._warn("shadows are not local shading; they are left out")
         if wanted & NORMALS:
             self._warn("normals are drawn by pyrender's viewer alone; they are left out, as in its offscreen pictures")
-        size = (self.viewport_width, self.viewport_height)
-        if min(size) < 1:
-            raise SceneError(f"a viewport of {size[0]} x {size[1]} pixels has no picture: both must be 1 or more")
-        camera = main_camera(scene, size)
-        if camera is None:
-            raise SceneError("the scene has no camera")
         nodes, colours = scene.mesh_nodes, {}
         if segmented:
             colours = {node: colour_of(given) for node, given in (seg_node_map or {}).items()}
@@ -141,25 +149,103 @@ class OffscreenRenderer:
         kind: Literal["lit", "flat", "silhouette"] = "silhouette"
         if plain:
             kind = "flat" if RenderFlags.FLAT in wanted else "lit"
-        look = Look(kind, RenderFlags.SKIP_CULL_FACES in wanted, colours)
+        look = Look(kind, RenderFlags.SKIP_CULL_FACES in wanted, colours, kind == "lit" and self._most_lights is not None)
         converted = self._conversion.convert(scene, nodes, look, lambda: screen(camera, size, self.point_size))
         for note in converted.notes:
             self._warn(note)
-        with self._painter.renderer.context.gl as gl:
+        if kind == "lit" and self._most_lights is None and crowded(scene):
+            self._warn(CROWDED)
+        with painter.renderer.context.gl as gl:
             gl.gc()
-            canvas = self._painter.canvas(size, 1 if segmented else SAMPLES, not depth_only)
+            canvas = painter.canvas(size, 1 if segmented else self._samples, not depth_only)
             canvas.begin(tuple(float(c) for c in scene.bg_color) if plain else BLACK)
             depth = np.zeros(size[::-1], dtype=np.float32)
             if converted.objects:
                 wires = _wires(converted, wanted) if plain else set()
-                shown_lights = lights(scene) if kind == "lit" else AS_THEY_ARE
+                shown_lights = lights(scene, self._most_lights) if kind == "lit" else AS_THEY_ARE
                 encoding: Literal["power", "linear"] = "power" if kind == "lit" else "linear"
-                view, unit = self._painter.paint(converted.objects, wires, shown_lights, camera, canvas, encoding)
+                view, unit = painter.paint(converted.objects, wires, shown_lights, camera, canvas, encoding)
                 canvas.resolve()
-                depth = canvas.depth(view, unit)
+                depth = canvas.depth(view, unit * getattr(camera, "depth_scale", 1.0), getattr(camera, "planes", None))
             else:
                 canvas.resolve()
             return depth if depth_only else (canvas.colour(4 if RenderFlags.RGBA in wanted else 3), depth)
+
+    def normals(self, scene: Any) -> Any:
+        """Returns the unit shading normals (H, W, 3) float32 in world space at the pixels' middles, 0 where nothing is drawn.
+
+        Normal maps count. Points and lines are drawn, too. To see normals as colours, use `(normals + 1) / 2`.
+        scene: a pyrender.Scene.
+        Errors: SceneError; GlshadeError after `delete`.
+        """
+        from glshade.assembly.part import Part
+        from glshade.pyrender.scene import Look, screen
+        from glshade.scene.film import Film
+        from glshade.scene.scene import Scene
+
+        painter, size, camera = self._begin(scene)
+        result = np.zeros((size[1], size[0], 3), dtype=np.float32)
+        converted = self._conversion.convert(scene, scene.mesh_nodes, Look(), lambda: screen(camera, size, self.point_size))
+        for note in converted.notes:
+            self._warn(note)
+        if converted.objects:
+            drawn = Scene.model_construct(objects=tuple(converted.objects), lights=(), camera=camera, film=Film(size=size))
+            (pixels,) = painter.renderer.draw_part(drawn, Part("normal"))
+            length = np.linalg.norm(pixels[..., :3], axis=2, keepdims=True)
+            np.divide(pixels[..., :3], length, out=result, where=length > 0)
+        # A picture that is upside down is drawn the right way up and turned here.
+        return result[::-1] if getattr(camera, "flipped", False) else result
+
+    def faces(self, scene: Any) -> Any:
+        """Returns (triangle, surface, surfaces) of what is visible at the pixels' middles.
+
+        triangle: (H, W) int32, the number of the triangle in its primitive, from 0; -1 where no triangle is drawn.
+        surface: (H, W) int32, the number of the triangle's surface in `surfaces`; -1 where no triangle is drawn.
+        surfaces: a list of (node, number of the primitive in the node's mesh, number of the instance).
+
+        Points and lines are left out, and blended surfaces count as opaque.
+        scene: a pyrender.Scene.
+        Errors: SceneError, also for more than 16,777,215 triangles; GlshadeError after `delete`.
+        """
+        from glshade.pyrender.faces import decoded, numbered
+        from glshade.pyrender.scene import AS_THEY_ARE
+
+        painter, size, camera = self._begin(scene)
+        objects, surfaces, starts = numbered(scene)
+        with painter.renderer.context.gl as gl:
+            gl.gc()
+            canvas = painter.canvas(size, 1, True)
+            canvas.begin((0.0, 0.0, 0.0, 0.0))
+            if objects:
+                painter.paint(objects, set(), AS_THEY_ARE, camera, canvas, "linear")
+            canvas.resolve()
+            codes = canvas.colour(3)
+        return (*decoded(codes, starts), surfaces)
+
+    def _begin(self, scene: Any) -> tuple[Painter, tuple[int, int], Any]:
+        """Returns (painter, size of the pictures [pixels], glshade's camera). Errors: SceneError, GlshadeError."""
+        from glshade.pyrender.scene import main_camera
+
+        if self._painter is None:
+            raise GlshadeError("this OffscreenRenderer was deleted; create another")
+        size = (self.viewport_width, self.viewport_height)
+        if min(size) < 1:
+            raise SceneError(f"a viewport of {size[0]} x {size[1]} pixels has no picture: both must be 1 or more")
+        camera = main_camera(scene, size)
+        if camera is None:
+            raise SceneError("the scene has no camera")
+        if note := getattr(camera, "note", ""):
+            self._warn(note)
+        return self._painter, size, camera
+
+    @property
+    def _renderer(self) -> Any:
+        """pyrender's private renderer, whose shaders programs replace; here it is an error, which names the calls to use."""
+        raise GlshadeError(NO_SHADERS)
+
+    @_renderer.setter
+    def _renderer(self, value: Any) -> None:
+        raise GlshadeError(NO_SHADERS)
 
     def _warn(self, message: str) -> None:
         """Gives a warning, unless this renderer has given the same one before."""
@@ -176,6 +262,13 @@ class OffscreenRenderer:
     def __del__(self) -> None:
         with contextlib.suppress(Exception):
             self.delete()
+
+
+def _counted(name: str, value: int) -> int:
+    """Returns a number that must be 1 or more. Errors: GlshadeError, which begins with the name."""
+    if int(value) != value or value < 1:
+        raise GlshadeError(f"{name} = {value}: it must be a whole number, 1 or more")
+    return int(value)
 
 
 def _wires(converted: Converted, wanted: RenderFlags) -> set[int]:

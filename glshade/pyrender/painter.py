@@ -76,7 +76,9 @@ class Painter:
         """
         ready = self._prepared(objects, lights, camera, canvas.size, encoding)
         view = ready.prepared.assembly.view
-        clip = rounded(view.clip_from_world(self.renderer.context.zero_to_one) * UPRIGHT)
+        # glshade's own pictures are upside down already, as the picture of a flipped camera has to be.
+        turn = 1.0 if getattr(camera, "flipped", False) else UPRIGHT
+        clip = rounded(view.clip_from_world(self.renderer.context.zero_to_one) * turn)
         gl = self.renderer.context.gl
 
         def draw(calls: Iterable[DrawCall]) -> None:
@@ -94,7 +96,7 @@ class Painter:
                 draw(replace(call, plan=replace(call.plan, alpha="opaque")) for call in blended)
         # The ratio of the near planes is the length of the view's unit: the renderer changes the unit for scenes of extreme
         # size.
-        return view, camera.near / view.near if camera.near else 1.0
+        return view, next((own / seen for own, seen in ((camera.near, view.near), (camera.far, view.far)) if own), 1.0)
 
     def canvas(self, size: tuple[int, int], samples: int, coloured: bool) -> Canvas:
         """Returns a canvas, the cached one if it has the right size. Errors: GlshadeError if the size is too large.
@@ -125,7 +127,8 @@ class Painter:
         prepared = self.renderer.prepare(scene, None, any_encoding)
         if any(call.added for call in prepared.calls):
             raise SceneError(f"more than {PAGE} lights of a kind: glshade.render(glshade.from_pyrender(scene)) draws them")
-        ready = Ready(encoding, prepared, list(map(_upright, prepared.calls)))
+        calls = prepared.calls if getattr(camera, "flipped", False) else list(map(_upright, prepared.calls))
+        ready = Ready(encoding, prepared, calls)
         self._ready = [*self._ready[1 - KEPT_SCENES :], ready]
         return ready
 

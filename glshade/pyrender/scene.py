@@ -22,7 +22,7 @@ from glshade.mesh.file import AssetWarning
 from glshade.mesh.mesh import Mesh
 from glshade.pyrender.cameras import affine_rows, camera
 from glshade.pyrender.materials import WHITE, Colour, material, silhouette
-from glshade.pyrender.meshes import arrays, is_drawn_with_strokes, mesh, strokes
+from glshade.pyrender.meshes import arrays, is_drawn_with_strokes, lost_triangles, mesh, strokes
 from glshade.scene.camera import Perspective, is_singular
 from glshade.scene.film import Film
 from glshade.scene.object import Object, Transform
@@ -48,8 +48,12 @@ def from_pyrender(scene: Any, size: tuple[int, int] = (640, 480)) -> Scene:
     Errors: SceneError, also where nothing is left to draw.
     """
     main = main_camera(scene, size)
+    if getattr(main, "flipped", False):
+        raise SceneError("the camera's projection turns the picture upside down: only OffscreenRenderer can draw that")
     viewport = None if main is None else lambda: screen(main, size)
     converted = Conversion().convert(scene, scene.mesh_nodes, Look(), viewport)
+    if note := getattr(main, "note", ""):
+        converted.warn(note)
     if converted.wires:
         converted.warn("wireframes are drawn solid")
     for note in converted.notes:
@@ -100,11 +104,13 @@ class Look:
     kind: "lit" for the materials themselves, "flat" for their base colours, "silhouette" for one colour for each node.
     both: True to draw back faces even where a material does not ask for it.
     colours: node -> colour of its silhouette, from 0 to 1; the default is white.
+    named: whether objects are named after the places of their nodes, as `lights` needs for a limited number of lights.
     """
 
     kind: Literal["lit", "flat", "silhouette"] = "lit"
     both: bool = False
     colours: Mapping[Any, Colour] = field(default_factory=dict)
+    named: bool = False
 
 
 @dataclass(eq=False)
@@ -147,9 +153,7 @@ class Conversion:
         make_viewport: returns the picture in which points and lines have a width; None leaves them out with a warning.
         Errors: SceneError.
         """
-        eye = np.zeros(3) if scene.main_camera_node is None else scene.get_pose(scene.main_camera_node)[:3, 3]
-        placed = [(node, scene.get_pose(node)) for node in nodes if node.mesh.is_visible]
-        placed.sort(key=lambda pair: (-float(np.linalg.norm(pair[1][:3, 3] - eye)), pair[0].name or "", pair[1].tobytes()))
+        placed = in_order(scene, nodes)
         result = Converted([], [], set(), [])
         last = self._last.get((look.kind, look.both), {})
         current: dict[tuple[Any, ...], tuple[Any, Any]] = {}
@@ -168,7 +172,13 @@ class Conversion:
                 else:
                     brdf = silhouette(primitive, look.colours.get(node, WHITE), look.both)
                 sources = arrays(primitive)
-                for world in _instances(primitive, pose):
+                if not is_drawn_with_strokes(primitive):
+                    lost = cached(sources, tuple(map(id, sources)), partial(lost_triangles, primitive))
+                    if lost:
+                        result.warn(
+                            f"{node.mesh.name or 'a mesh'}: {lost} triangles with a corner that is not finite are left out"
+                        )
+                for world in instances(primitive, pose):
                     if not is_drawn_with_strokes(primitive):
                         shape = mesh(primitive)
                     elif make_viewport is not None:
@@ -182,8 +192,9 @@ class Conversion:
                         result.warn("points and lines are left out: they are as wide as pixels, and the scene has no camera")
                     if shape is None:
                         continue
-                    key = (id(shape), id(brdf), world.tobytes())
-                    item = cached((shape, brdf), key, partial(_object, shape, brdf, world, coloured))
+                    name = place_name(pose) if look.named else None
+                    key = (id(shape), id(brdf), world.tobytes(), name)
+                    item = cached((shape, brdf), key, partial(placed_object, shape, brdf, world, coloured, name))
                     if item is not None:
                         if primitive.material.wireframe and coloured:
                             result.wires.add(len(result.objects))
@@ -193,7 +204,15 @@ class Conversion:
         return result
 
 
-def _instances(primitive: Any, pose: Array) -> Iterator[Array]:
+def in_order(scene: Any, nodes: Iterable[Any]) -> list[tuple[Any, Array]]:
+    """Returns (node, pose (4, 4)) of each visible node in pyrender's drawing order. scene: the pyrender.Scene of the nodes."""
+    eye = np.zeros(3) if scene.main_camera_node is None else scene.get_pose(scene.main_camera_node)[:3, 3]
+    placed = [(node, scene.get_pose(node)) for node in nodes if node.mesh.is_visible]
+    placed.sort(key=lambda pair: (-float(np.linalg.norm(pair[1][:3, 3] - eye)), pair[0].name or "", pair[1].tobytes()))
+    return placed
+
+
+def instances(primitive: Any, pose: Array) -> Iterator[Array]:
     """Yields the pose (4, 4) of each instance of a primitive. pose: (4, 4), the pose of the primitive's node."""
     if primitive.poses is None:
         yield pose
@@ -201,14 +220,14 @@ def _instances(primitive: Any, pose: Array) -> Iterator[Array]:
         yield from (pose @ own for own in primitive.poses.astype(np.float64))
 
 
-def _object(shape: Mesh, brdf: Brdf, pose: Array, coloured: bool) -> Object | None:
+def placed_object(shape: Mesh, brdf: Brdf, pose: Array, coloured: bool, name: str | None = None) -> Object | None:
     """Returns an object; None if its pose (4, 4) flattens it, because a flat object covers no pixel."""
     if is_singular(pose[:3, :3]):
         return None
     # model_construct skips validation: all parts are valid, and validating them again takes longer than the whole conversion.
     rows: Any = tuple(map(tuple, affine_rows(pose)))
     transform = Transform.model_construct(matrix=rows)
-    return Object.model_construct(mesh=shape, transform=transform, material=brdf, vertex_colours=coloured)
+    return Object.model_construct(mesh=shape, transform=transform, material=brdf, vertex_colours=coloured, name=name)
 
 
 def _named(converted: Converted) -> tuple[tuple[Object, ...], dict[str, Brdf]]:
@@ -241,36 +260,65 @@ def _named(converted: Converted) -> tuple[tuple[Object, ...], dict[str, Brdf]]:
 # --- lights ----------------------------------------------------------------------------------------------------------
 
 
-def lights(scene: Any) -> tuple[Light, ...]:
+def place_name(pose: Array) -> str:
+    """Returns the name of all objects of the nodes at one place. pose: (4, 4), the node's."""
+    return pose[:3, 3].tobytes().hex()
+
+
+def lights(scene: Any, most: int | None = None) -> tuple[Light, ...]:
     """Returns the lights of a pyrender.Scene.
 
     An intensity of E lux or candela becomes E / pi, the radiance of a white Lambertian surface that faces the light.
+
+    scene: a pyrender.Scene.
+    most: the number of lights of a kind that light an object, those nearest to its node; None for all. The objects must have
+        been converted with a Look that names them.
     """
-    return tuple(LIGHTS[table["type"]].model_validate(table) for table in _lights(scene))
+    poses = [] if most is None else [np.asarray(pose) for _, pose in in_order(scene, scene.mesh_nodes)]
+    return tuple(LIGHTS[table["type"]].model_validate(table) for table in _lights(scene, most, poses))
 
 
-def _lights(scene: Any) -> Iterator[dict[str, Any]]:
-    """Yields each light as a table of a scene file."""
+# The number of lights of a kind that pyrender's shader uses.
+PYRENDER_LIGHTS = 4
+
+
+def crowded(scene: Any) -> bool:
+    """Returns whether a pyrender.Scene has more lights of a kind than pyrender uses."""
+    kinds = (scene.directional_light_nodes, scene.point_light_nodes, scene.spot_light_nodes)
+    return any(len(nodes) > PYRENDER_LIGHTS for nodes in kinds)
+
+
+def _lights(scene: Any, most: int | None, poses: list[Array]) -> Iterator[dict[str, Any]]:
+    """Yields each light as a table of a scene file. most: as for `lights`. poses: (4, 4) of each mesh node."""
     if np.any(scene.ambient_light):
         yield {"type": "ambient", "colour": _three(scene.ambient_light)}
 
-    def ordered(nodes: Iterable[Any]) -> list[tuple[Any, Array]]:
+    def ordered(nodes: Iterable[Any]) -> Iterator[tuple[Any, Array, dict[str, Any]]]:
         # pyrender keeps lights in sets, whose order varies from run to run. The lights are sorted, because the sum of their
         # light is rounded differently in each order.
         placed = [(node.light, scene.get_pose(node)) for node in nodes]
-        return sorted(placed, key=lambda pair: pair[1].tobytes())
+        placed.sort(key=lambda pair: pair[1].tobytes())
+        chosen: list[set[str]] = [set() for _ in placed]
+        if most is not None and len(placed) > most:
+            places = np.array([pose[:3, 3] for _, pose in placed])
+            for pose in poses:
+                for i in np.argsort(np.linalg.norm(places - pose[:3, 3], axis=1), kind="stable")[:most]:
+                    chosen[i].add(place_name(pose))
+        limited = most is not None and len(placed) > most
+        for (light, pose), names in zip(placed, chosen, strict=True):
+            yield light, pose, {"only": tuple(sorted(names))} if limited else {}
 
     def common(light: Any) -> dict[str, Any]:
         return {"colour": _three(light.color), "intensity": light.intensity / math.pi, "name": light.name}
 
-    for light, pose in ordered(scene.directional_light_nodes):
-        yield {"type": "directional", **common(light), "direction": _three(-pose[:3, 2])}
-    for light, pose in ordered(scene.point_light_nodes):
-        yield {"type": "point", **common(light), "position": _three(pose[:3, 3]), "r_min": R_MIN}
-    for light, pose in ordered(scene.spot_light_nodes):
+    for light, pose, only in ordered(scene.directional_light_nodes):
+        yield {"type": "directional", **common(light), **only, "direction": _three(-pose[:3, 2])}
+    for light, pose, only in ordered(scene.point_light_nodes):
+        yield {"type": "point", **common(light), **only, "position": _three(pose[:3, 3]), "r_min": R_MIN}
+    for light, pose, only in ordered(scene.spot_light_nodes):
         cone = {"inner": math.degrees(light.innerConeAngle), "outer": math.degrees(light.outerConeAngle)}
         place = {"direction": _three(-pose[:3, 2]), "position": _three(pose[:3, 3]), "r_min": R_MIN}
-        yield {"type": "gltf_spot", **common(light), **place, **cone}
+        yield {"type": "gltf_spot", **common(light), **only, **place, **cone}
 
 
 def _three(values: Any) -> tuple[float, float, float]:

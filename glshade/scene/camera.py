@@ -419,7 +419,11 @@ class Intrinsics(Camera):
     @property
     def _model(self) -> "Perspective | Orthographic":
         """The centred camera that chooses its planes as this one does."""
-        return (Perspective if self.projection == "perspective" else Orthographic)(near=self.near, far=self.far)
+        planes = {"near": self.near, "far": self.far}
+        if self.projection == "perspective":
+            return Perspective.model_validate(planes)
+        # The check of the planes reads the type, because only an orthographic view may begin behind its eye.
+        return Orthographic.model_validate({"type": "orthographic", **planes})
 
     def view(self, points: Array, aspect: float) -> View:
         view = super().view(points, aspect)

@@ -193,7 +193,7 @@ class SceneFile:
 
     def drawn(self, frame: float | None) -> dict[str, Any]:
         """Returns the values of the sample that is drawn at a frame, by their dotted keys; empty without a sample."""
-        sample = self._written.sample
+        sample = self._other._written.sample
         return {} if sample is None or frame is None else sample.drawn(math.floor(frame))
 
     def _through(self, camera: str, scene: Scene) -> Scene:

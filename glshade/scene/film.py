@@ -17,7 +17,8 @@ from pydantic import (
 
 from glshade.document import Document, Finite, fault, nearest, number, resolved, value_of
 from glshade.errors import figure
-from glshade.image.layers import AOVS, PNG_AOVS, LayerFormat
+from glshade.image.layer_paths import PNG_AOVS, LayerFormat
+from glshade.image.layers import AOVS
 from glshade.limits import Limits
 
 # The largest side of a picture [pixels]. A row of 2^17 pixels of 16 bytes is 2 MiB, which other programs can still open.

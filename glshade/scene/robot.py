@@ -193,7 +193,8 @@ class Robot:
         for end, name in (("parent", joint.parent), ("child", joint.child)):
             if name not in self._links:
                 raise self._fail(place, f'its {end} "{printable(str(name)[:100])}" is none of the links')
-        if not (_is_finite(joint.origin) and _is_finite(joint.axis) and _is_finite(_range(joint), True)):
+        ratio = joint.mimic and (joint.mimic.multiplier, joint.mimic.offset)
+        if not all(map(_is_finite, (joint.origin, joint.axis, ratio))) or any(map(math.isnan, _range(joint))):
             raise self._fail(place, "has a number that is not finite")
         if joint.type in MOVING and not np.linalg.norm(joint.axis) > 0:
             raise self._fail(place, "its axis has no direction")
@@ -301,16 +302,21 @@ class Robot:
     def _mesh(self, mesh: Any, place: str) -> tuple[dict[str, Any], Array, bool, bool]:
         """Returns the values of `_geometry` for a mesh file. Errors: SceneError."""
         path = self._named(mesh.filename, place)
-        scale = np.ones(3) if mesh.scale is None else np.broadcast_to(np.asarray(mesh.scale, dtype=np.float64), (3,))
-        if not (np.isfinite(scale).all() and scale.all()):
-            raise self._fail(place, "the scale of its mesh must be numbers that are not zero")
+        scale = np.ones(3) if mesh.scale is None else np.asarray(mesh.scale, dtype=np.float64)
+        if scale.size not in (1, 3) or not (np.isfinite(scale).all() and scale.all()):
+            raise self._fail(place, "the scale of its mesh must be one number or three, none of them zero")
         try:
             parts = mesh_file.load(path, self._limits, self._folders).parts
         except AssetError as error:
             raise SceneError([f"{self.path}: {place}{problem}" for problem in error.problems]) from None
         turn = Z_FROM_Y if path.suffix.lower() in WITH_UP else np.eye(4)
         own = any(part.material is not None or part.mesh.colours is not None for part in parts)
-        return {"mesh": str(path)}, np.diag([*scale, 1.0]) @ turn, all(part.mesh.uvs is not None for part in parts), own
+        return (
+            {"mesh": str(path)},
+            np.diag([*np.broadcast_to(scale.reshape(-1), 3), 1.0]) @ turn,
+            all(part.mesh.uvs is not None for part in parts),
+            own,
+        )
 
     def _material(self, material: Any, textured: bool, place: str) -> dict[str, Any] | None:
         """Returns the material of a visual; None where it has none. textured: whether the shape has texture coordinates."""
@@ -411,7 +417,9 @@ def _copy(source: Element, target: Element, wanted: Mapping[str, Any]) -> None:
     for element in source:
         if element.tag in wanted:
             inner = MATERIAL if element.tag == "material" else wanted[element.tag]
-            _copy(element, SubElement(target, element.tag, element.attrib), inner)
+            # No attribute of URDF has a name beyond ASCII.
+            attributes = {name: value for name, value in element.attrib.items() if name.isascii()}
+            _copy(element, SubElement(target, element.tag, attributes), inner)
 
 
 def _parsed(root: Element) -> Any:
@@ -452,12 +460,9 @@ def _rows(matrix: Array) -> list[list[float]]:
     return rows
 
 
-def _is_finite(numbers: Any, infinite: bool = False) -> bool:
-    """Returns whether all numbers are finite, or at least none is NaN; true where there are none."""
-    if numbers is None:
-        return True
-    array = np.asarray(numbers, dtype=np.float64)
-    return not bool(np.isnan(array).any()) if infinite else bool(np.isfinite(array).all())
+def _is_finite(numbers: Any) -> bool:
+    """Returns whether all numbers are finite; true where there are none."""
+    return numbers is None or bool(np.isfinite(np.asarray(numbers, dtype=np.float64)).all())
 
 
 def _plain(name: str) -> str:

@@ -70,6 +70,7 @@ def test_shipped_scene_whole(path: Path, shading: Rate, renderer: glshade.Render
     assert verdict.verdict == "verified", str(verdict)
 
 
+@pytest.mark.filterwarnings("ignore:.*its animations are not played")
 @pytest.mark.parametrize("shading", ["flat", "gouraud", "phong"])
 @pytest.mark.parametrize("path", MESHES, ids=lambda path: path.name)
 def test_mesh(path: Path, shading: Rate, renderer: glshade.Renderer) -> None:
@@ -78,6 +79,7 @@ def test_mesh(path: Path, shading: Rate, renderer: glshade.Renderer) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.filterwarnings("ignore:.*its animations are not played")
 @pytest.mark.parametrize("shading", ["flat", "gouraud", "phong"])
 @pytest.mark.parametrize("path", MESHES, ids=lambda path: path.name)
 def test_mesh_large(path: Path, shading: Rate, renderer: glshade.Renderer) -> None:

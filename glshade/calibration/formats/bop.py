@@ -15,7 +15,7 @@ import numpy as np
 from glshade.arrays import Float64
 from glshade.calibration.calibration import CalibratedPicture
 from glshade.calibration.formats import CameraFormat
-from glshade.calibration.reading import at, camera, numbers, pinhole, pose, table
+from glshade.calibration.reading import at, camera, check_count, numbers, pinhole, pose, table
 from glshade.calibration.rotation import FLIPPED, inverse_pose
 from glshade.errors import AssetError
 
@@ -52,7 +52,9 @@ class Bop(CameraFormat):
     def read(self, path: Path) -> list[CalibratedPicture]:
         found = []
         where = path / "scene_camera.json"
-        for number, row in sorted(table(where).items(), key=lambda item: (len(item[0]), item[0])):
+        entries = table(where)
+        check_count(len(entries), where)
+        for number, row in sorted(entries.items(), key=lambda item: (len(item[0]), item[0])):
             if not isinstance(row, dict):
                 raise AssetError(f"{where}: {number}: must be a table with cam_K, cam_R_w2c and cam_t_w2c")
             name = str(row.get("file", number))

@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from glshade.calibration.calibration import CalibratedPicture
 from glshade.calibration.formats import CameraFormat
-from glshade.calibration.reading import Fault, at, camera, number, numbers, pixels, pose, text
+from glshade.calibration.reading import Fault, at, camera, check_count, number, numbers, pixels, pose, text
 from glshade.calibration.rotation import FLIPPED, inverse_pose, quaternion, rotation_of
 from glshade.errors import AssetError
 
@@ -56,7 +56,9 @@ class Colmap(CameraFormat):
         # A camera counts only if a picture was taken by it.
         cameras = {number: words for number, *words in map(str.split, _lines(path / "cameras.txt"))}
         where, found = path / "images.txt", []
-        for line in _images(where):
+        images = list(_images(where))
+        check_count(len(images), where)
+        for line in images:
             _, *values, number, name = words = line.split(None, 9)
             if len(words) < 10:
                 raise AssetError(

@@ -67,6 +67,8 @@ def read(file: MeshFile) -> None:
             add_light(file, light, lights[light], world)
     if not nodes.tables:
         reader.add_loose()
+    if header.get("animations"):
+        file.warn("its animations are not played; drawn as its nodes stand without them")
     if not file.contents.parts:
         raise file.fail("holds nothing to draw: no visible node of its scene has a mesh with triangles, lines or points")
 

@@ -11,7 +11,7 @@ import pytest
 
 import glshade as g
 from glshade.errors import GlshadeError, SceneError
-from glshade.image.masks import masks
+from glshade.image.masks import object_masks
 from glshade.scene import labels
 
 # Ten samples, in which a ball and a cube stand elsewhere.
@@ -90,7 +90,7 @@ def test_boxes_and_masks_are_those_of_the_layer(folder: Path, renderer: g.Render
     g.render_all("s.toml", "a.png", coco="coco.json")
     told = json.loads((folder / "coco.json").read_text())
     numbers = renderer.layers(g.load("s.toml")).arrays["object_id"][..., 0].astype(int)
-    expected = masks(numbers)
+    expected = object_masks(numbers)
     assert len(expected) == 2
     assert told["images"] == [{"id": 1, "file_name": "a.png", "width": 32, "height": 24}]
     assert told["categories"] == [{"id": 1, "name": "block"}, {"id": 2, "name": "toy"}]

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 from support.command import run_command
 
 from glshade.calibration import file as camera_file
+from glshade.calibration import reading
 from glshade.calibration.formats import FORMATS
 from glshade.errors import AssetError, SceneError
 from glshade.scene.camera import Intrinsics, Orthographic
@@ -190,6 +191,30 @@ def test_overrides_belong_to_the_camera_that_is_seen_through(tmp_path: Path) -> 
     assert (seen.camera.fx, seen.camera.fy) == (45, 90)
     with pytest.raises(SceneError, match=r"camera\.fx: unknown key.*from --set"):
         SceneFile(tmp_path / "s.toml", {"camera.fx": 45.0}).scene()
+
+
+def test_the_camera_of_a_file_is_changed_in_a_batch_of_a_sampled_scene(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "s.toml").write_text(SCENE + '[[sample.values]]\nkey = "objects.0.category"\nchoice = ["ball"]\n')
+    pictures = [{**PICTURE, "file": name, "K": [[20, 0, 12], [0, 20, 8], [0, 0, 1]]} for name in ("a", "b")]
+    (tmp_path / "from.json").write_text(json.dumps({"pictures": pictures}))
+    paths = [str(tmp_path / name) for name in ("s.toml", "from.json", "{camera}.png", "to.json")]
+    command = ["render", paths[0], "--cameras-from", paths[1], "-o", paths[2], "--cameras", paths[3], "--jobs", "1"]
+    ran = run_command(capsys, *command, "--set", "camera.fx=30")
+    assert ran.code == 0, ran.out + ran.err
+    seen = [found.calibration for found in camera_file.read(tmp_path / "to.json")]
+    # The film has 24 x 16 pixels, while the numbers of the cameras belong to 100 x 80.
+    np.testing.assert_allclose([(each.fx, each.fy) for each in seen], [(30 * 24 / 100, 20 * 16 / 80)] * 2)
+
+
+@pytest.mark.parametrize("name", KINDS)
+def test_too_many_cameras_are_refused_before_they_are_understood(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(reading, "MOST_CAMERAS", 0)
+    with pytest.raises(AssetError, match="holds 1 cameras; 0 can be read"):
+        _read(tmp_path, name, KINDS[name][1])
 
 
 def _render(folder: Path, capsys: pytest.CaptureFixture[str], *more: str) -> tuple[int, str]:

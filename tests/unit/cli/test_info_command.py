@@ -101,6 +101,13 @@ def test_a_warning_is_a_note(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert result.code == 0
 
 
+def test_textures_without_coordinates_are_a_note(tmp_path: Path) -> None:
+    Image(np.zeros((1, 1, 3), dtype=np.uint8), "srgb").save(tmp_path / "red.png")
+    (tmp_path / "a.mtl").write_text("newmtl a\nmap_Kd red.png\n")
+    (note,) = mesh_information(cube(tmp_path / "a.obj", extra="mtllib a.mtl\nusemtl a\n"))["warnings"]
+    assert note == "a has no texture coordinates; drawn without the textures of its material"
+
+
 def test_a_texture_has_its_size(tmp_path: Path) -> None:
     Image(np.zeros((3, 5, 3), dtype=np.uint8), "srgb").save(tmp_path / "red.png")
     (tmp_path / "a.mtl").write_text("newmtl a\nmap_Kd red.png\n")

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
 
-from glshade.image.masks import masks, packed
+from glshade.image.masks import object_masks, packed
 
 
 def unpacked(text: str) -> list[int]:
@@ -45,7 +45,7 @@ def test_texts_are_those_of_cocos_own_library() -> None:
 
 @given(arrays(np.int32, array_shapes(min_dims=2, max_dims=2, max_side=12), elements=st.integers(-1, 3)))
 def test_masks_say_what_the_pixels_say(numbers: NDArray[Any]) -> None:
-    found = masks(numbers)
+    found = object_masks(numbers)
     assert set(found) == set(numbers[numbers > 0].tolist())
     for number, mask in found.items():
         counts = unpacked(mask["counts"])

@@ -14,8 +14,9 @@ from hypothesis import strategies as st
 from glshade.errors import GlshadeError
 from glshade.image import file
 from glshade.image.image import Image
-from glshade.image.layers import Layers, layer_files
-from glshade.image.png_layers import LAYER, MOST, codes, round_scale
+from glshade.image.layer_paths import layer_files
+from glshade.image.layers import Layers
+from glshade.image.png_layers import LAYER, MOST, Coding, codes, round_scale
 
 
 def layers(arrays: dict[str, Any], **keys: Any) -> Layers:
@@ -42,8 +43,7 @@ def test_a_scale_reaches_to_the_depth_and_is_round(largest: float) -> None:
 @given(st.lists(st.one_of(st.just(0.0), st.floats(1e-3, 1e6)), min_size=1, max_size=20))
 def test_depths_come_back_within_half_a_code(depths: list[float]) -> None:
     array = np.array(depths, dtype=np.float32).reshape(1, -1, 1)
-    made = layers({"depth": array})
-    pixels, told = codes(Path("a.png"), "depth", array, made)
+    pixels, told = codes(Path("a.png"), "depth", array, Coding())
     assert pixels.dtype == np.uint16
     assert ((pixels == 0) == (array == 0)).all()
     off = np.abs(pixels * told["scale"] - array.astype(np.float64))
@@ -52,15 +52,15 @@ def test_depths_come_back_within_half_a_code(depths: list[float]) -> None:
 
 
 def test_a_depth_beyond_a_given_scale_is_refused() -> None:
-    made = layers({"depth": np.full((1, 1, 1), 70.0, np.float32)}, depth_scale=0.001)
+    depth = np.full((1, 1, 1), 70.0, np.float32)
     with pytest.raises(GlshadeError, match=r"a\.png: holds the depth 70, but film\.depth_scale = 0\.001 reaches to 65\.535"):
-        codes(Path("a.png"), "depth", made.arrays["depth"], made)
+        codes(Path("a.png"), "depth", depth, Coding(depth_scale=0.001))
 
 
 @given(st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda n: np.linalg.norm(n) > 0.1))
 def test_normals_come_back(normal: tuple[float, float, float]) -> None:
     array = (np.array([[normal, (0, 0, 0)]]) / np.linalg.norm(normal)).astype(np.float32)
-    pixels, _ = codes(Path("a.png"), "normal", array, layers({"normal": array}))
+    pixels, _ = codes(Path("a.png"), "normal", array, Coding())
     assert pixels[0, 1].tolist() == [0, 0, 0]
     assert pixels[0, 0].min() >= 1
     np.testing.assert_allclose((pixels[0, 0] - 32768.0) / 32767, array[0, 0], atol=0.51 / 32767)

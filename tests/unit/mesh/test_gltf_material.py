@@ -174,6 +174,10 @@ class TestModel:
         if keys:
             assert silent(folder, **extension(name)), "a strength of 0 leaves out nothing"
 
+    def test_a_material_without_a_name_is_named_by_its_place(self, folder: Path) -> None:
+        _, warnings = converted(folder, name="", **extension("EXT_something_new"))
+        assert warnings.startswith("materials[3]: drawn without EXT_something_new")
+
 
 class TestCoverage:
     """Opacity and sides."""

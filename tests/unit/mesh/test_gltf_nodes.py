@@ -126,6 +126,11 @@ def test_extensions_that_are_needed_or_used(tmp_path: Path) -> None:
     assert len(caught) == 1
 
 
+def test_animations_are_named_as_left_out(tmp_path: Path) -> None:
+    with pytest.warns(AssetWarning, match="a.glb: its animations are not played"):
+        parts(tmp_path, tree([{"mesh": 0}], animations=[{"channels": [], "samplers": []}]))
+
+
 @pytest.mark.parametrize(
     ("document", "message"),
     [

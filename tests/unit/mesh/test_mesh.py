@@ -162,6 +162,14 @@ def test_normals_that_are_no_directions_are_replaced() -> None:
     np.testing.assert_allclose(mesh.normals, CUBE_POSITIONS / np.sqrt(3), atol=1e-6)
 
 
+@pytest.mark.parametrize("value", [0.0, np.nan, np.inf])
+def test_normals_without_any_direction_are_none(value: float) -> None:
+    mesh = Mesh.build(CUBE_POSITIONS, CUBE_TRIANGLES, normals=np.full((8, 3), value), tangents=np.ones((8, 4)))
+    assert mesh.normals is None
+    assert mesh.tangents is None
+    assert len(with_normals(mesh, "auto", 40).positions) == 24, "the edges of the cube are sharp"
+
+
 def test_normals_that_cancel_fall_back_to_one_of_the_faces() -> None:
     both = Mesh.build([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 1]])
     smooth = with_normals(both, "smooth", 180)

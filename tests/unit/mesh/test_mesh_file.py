@@ -662,6 +662,7 @@ def test_a_bit_of_an_entry_flips(name: str, tmp_path: Path, own_cache: Path) -> 
 # --- real files ------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.filterwarnings("ignore:.*its animations are not played")
 @pytest.mark.parametrize(
     ("name", "parts", "triangles"),
     [

@@ -94,7 +94,7 @@ def test_the_python_of_extending(tmp_path: Path, python: Any) -> None:
 
 
 def test_the_python_of_the_page_about_python(tmp_path: Path, python: Any) -> None:
-    (code,) = re.findall(
+    code, *_ = re.findall(
         r"^```python\n(.*?)^```", (ROOT / "docs/python.md").read_text(encoding="utf-8"), flags=re.MULTILINE | re.DOTALL
     )
     python(code, cwd=tmp_path)

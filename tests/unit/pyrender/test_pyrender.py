@@ -588,6 +588,7 @@ def test_changes_are_seen(offscreen: OffscreenRenderer) -> None:
     changed()
 
 
+@pytest.mark.filterwarnings("ignore:pyrender. the scene has more than four lights")
 def test_more_lights_than_a_page_are_refused(offscreen: OffscreenRenderer) -> None:
     lamps = {Thing(light=Thing(color=np.ones(3), intensity=1.0, name=None), pose=moved(0.01 * i, z=3)) for i in range(300)}
     with pytest.raises(SceneError, match="more than 256 lights of a kind"):

@@ -521,6 +521,7 @@ def test_many_lights_like_the_gpu(renderer: Renderer, count: int) -> None:
     assert differing(renderer, scene({"shape": "icosphere"}, lights, AROUND, (96, 96))).max() < CLOSE
 
 
+@pytest.mark.filterwarnings("ignore:.*its animations are not played")
 @pytest.mark.parametrize("name", ["spot.obj", "suzanne.obj", "teapot.obj", "Duck.glb", "CesiumMilkTruck.glb", "fuze.obj"])
 @pytest.mark.parametrize(
     "rate", [pytest.param("flat", marks=pytest.mark.slow), pytest.param("gouraud", marks=pytest.mark.slow), "phong"]

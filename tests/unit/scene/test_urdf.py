@@ -139,6 +139,19 @@ def test_a_mesh_file_keeps_its_own_material(tmp_path: Path) -> None:
     assert given == {"plain.obj": (0, 0, 1), "own.obj": (0, 1, 0)}
 
 
+@pytest.mark.parametrize("scale", ["1 2", "0 1 1", "nan"])
+def test_a_scale_that_cannot_be_is_refused(tmp_path: Path, scale: str) -> None:
+    written(tmp_path, OBJ, "t.obj")
+    path = written(tmp_path, MESH.format(name="t.obj", more="").replace("1 2 3", scale))
+    with pytest.raises(SceneError, match='link "body"'):
+        load(path)
+
+
+def test_attributes_with_foreign_names_are_ignored(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    assert load(written(tmp_path, ARM.replace("effort=", "e\u0123=")))
+    assert not caplog.records
+
+
 def test_a_texture_without_texture_coordinates_is_left_out(tmp_path: Path) -> None:
     written(tmp_path, OBJ, "t.obj")
     more = '<material name="x"><texture filename="t.png"/></material>'
@@ -187,6 +200,7 @@ FAULTS = {
     "limits": ('lower="-2"', 'lower="3"', "lower limit 3 lies above its upper limit 2"),
     "no geometry": ('<sphere radius="0.5"/>', "", 'link "slide"'),
     "colour": ("1 0 0 1", "255 0 0 1", "rgba"),
+    "infinite factor": ('multiplier="2"', 'multiplier="nan"', 'joint "follow": has a number that is not finite'),
     "empty": (ARM, "", "line"),
 }
 
