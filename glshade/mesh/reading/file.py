@@ -140,7 +140,7 @@ class MeshFile:
             raise self.fail(f"{where}{error}") from None
 
     def build_points(self, where: str, positions: Any, indices: Any = None, **named: Any) -> Mesh:
-        """Returns the mesh of the points with these indices (N,), by default of all vertices. The rest is as in `build_lines`."""
+        """Returns the mesh of the points with these indices (N,), by default of all vertices; else as `build_lines` does."""
         points = np.arange(len(positions)) if indices is None else np.asarray(indices).reshape(-1)
         return self.build_lines(where, positions, np.stack([points, points], axis=1), **named)
 
