@@ -56,7 +56,7 @@ def _triangle_count(mesh: Mesh) -> int:
 
 
 def check_texels(materials: Iterator[Brdf], limits: Limits) -> None:
-    """Checks the number of pixels of all textures. Their headers alone are read.
+    """Checks the number of pixels of all textures from files. Only the headers of the files are read.
 
     Errors: SceneError with the number, the limit and the option that raises it; AssetError for a picture that cannot be read.
     """
@@ -67,8 +67,9 @@ def check_texels(materials: Iterator[Brdf], limits: Limits) -> None:
         found |= {
             texels_of(material, name) for name in type(material).model_fields if isinstance(getattr(material, name), Picture)
         }
-    total = sum(picture_file.pixel_count(texels.path) for texels in found)
-    stored = sum(path.stat().st_size for path in {texels.path for texels in found})
+    paths = [texels.source for texels in found if isinstance(texels.source, Path)]
+    total = sum(map(picture_file.pixel_count, paths))
+    stored = sum(path.stat().st_size for path in set(paths))
     if total > max(limits.max_texels, TEXELS_PER_BYTE * stored):
         raise SceneError(f"materials: the textures have {total:,} pixels; {limits.max_texels:,} are allowed: see --max-texels")
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import sys
+import weakref
+from collections.abc import Hashable
 from typing import Any
 
 import moderngl
@@ -17,6 +19,7 @@ from glshade.gl.vertices import Vertices
 from glshade.glsl.flat_inputs import with_flat_inputs
 from glshade.glsl.source import Source
 from glshade.lru import Lru
+from glshade.textures.pixel_array import PixelArray
 from glshade.textures.texels import Texels
 
 # A program takes about this much memory [bytes]. llvmpipe keeps the machine code of each of its variants: 0.7 MiB were measured
@@ -45,7 +48,7 @@ class Resources:
         self.context = context
         self.vertices = Vertices(context)
         self._programs: Lru[tuple[tuple[str, ...], bool], Program] = Lru(PROGRAMS)
-        self._textures: Lru[tuple[Texels, int], moderngl.Texture] = Lru(TEXTURES)
+        self._textures: Lru[Hashable, moderngl.Texture] = Lru(TEXTURES)
         self._frames: Lru[tuple[tuple[int, int], Storage, int], Frame] = Lru(FRAMES, spare=FRAMES_IN_USE)
         self._pixels: list[NDArray[Any]] = []
 
@@ -78,9 +81,18 @@ class Resources:
         return self._programs, self._textures, self._frames
 
     def texture(self, texels: Texels) -> moderngl.Texture:
-        """Returns the texture of a picture file, loaded again if the file has changed. Errors: AssetError."""
-        key = texels, texels.path.stat().st_mtime_ns
-        return self._textures.find(key, lambda: upload(self.context, texels), texture_size)
+        """Returns the texture of a picture. It is loaded again if the file has changed, and evicted together with a picture in
+        memory. Errors: AssetError.
+        """
+        key = texels.key
+
+        def make() -> moderngl.Texture:
+            if isinstance(texels.source, PixelArray):
+                # The weak reference lets the cache, and with it the context, go before the picture does.
+                weakref.finalize(texels.source, _drop, weakref.ref(self._textures), key).atexit = False
+            return upload(self.context, texels)
+
+        return self._textures.find(key, make, texture_size)
 
     def frame(self, size: tuple[int, int], storage: Storage, samples: int) -> Frame:
         """Returns a frame to draw into, which may hold an earlier picture.
@@ -105,6 +117,13 @@ class Resources:
                 return array
         self._pixels = [*self._pixels[-1:], np.empty(shape, dtype=dtype)]
         return self._pixels[-1]
+
+
+def _drop(cache: weakref.ref[Lru[Hashable, Any]], key: Hashable) -> None:
+    """Removes a key from a cache that may be gone already."""
+    found = cache()
+    if found is not None:
+        found.drop(key)
 
 
 def texture_size(texture: moderngl.Texture) -> int:

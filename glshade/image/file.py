@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
+# The encoding of a picture's colours; "auto" takes integers as sRGB-encoded and floats as linear.
+Encoding = Literal["auto", "srgb", "linear"]
 # The suffixes of the files that can be written.
 SUFFIXES = frozenset(f".{name}" for name in FORMATS)
 
@@ -52,7 +54,7 @@ def write(path: Path, contents: PictureContents) -> None:
         raise GlshadeError(f"{path}: cannot be written: {error.strerror or error}") from None
 
 
-def read(path: str | Path, encoding: Literal["auto", "srgb", "linear"] = "auto") -> tuple[NDArray[np.float32], bool]:
+def read(path: str | Path, encoding: Encoding = "auto") -> tuple[NDArray[np.float32], bool]:
     """Returns a picture for use as a texture, and whether its file has alpha.
 
     The picture is (H, W, 4) float32, linear Rec. 709 with straight alpha; alpha is 1 where the file has none. More formats can
@@ -60,14 +62,19 @@ def read(path: str | Path, encoding: Literal["auto", "srgb", "linear"] = "auto")
     encoding: the encoding of the file's colours; "auto" takes integers as sRGB-encoded and floats as linear.
     Errors: AssetError.
     """
-    import numpy as np
-
-    from glshade.image.srgb import srgb_to_linear
-
     try:
         contents = _format_to_read(path).read(Path(path))
     except OSError as error:
         raise _unreadable(path, error) from None
+    return for_texture(contents, encoding)
+
+
+def for_texture(contents: PictureContents, encoding: Encoding) -> tuple[NDArray[np.float32], bool]:
+    """Returns a picture that was read, as `read` returns it, and whether it has alpha. encoding: as for `read`."""
+    import numpy as np
+
+    from glshade.image.srgb import srgb_to_linear
+
     pixels = contents.pixels
     count = pixels.shape[2]
     has_alpha = count in (2, 4)

@@ -225,7 +225,7 @@ def _material(material: Any, copy: Callable[[Path], Path]) -> Any:
     changed = {
         name: picture.model_copy(update={"texture": copy(picture.texture)})
         for name, picture in pictures.items()
-        if isinstance(picture, Picture)
+        if isinstance(picture, Picture) and isinstance(picture.texture, Path)
     }
     return material.model_copy(update=changed) if changed else material
 

@@ -21,10 +21,11 @@ Surface = tuple[Any, int, int]
 CODES = 1 << 24
 
 
-def numbered(scene: Any) -> tuple[list[Object], list[Surface], NDArray[np.int64]]:
+def numbered(scene: Any, both: bool) -> tuple[list[Object], list[Surface], NDArray[np.int64]]:
     """Returns (objects, surfaces (N), starts (N,)). The colour of a triangle of surface i is the code starts[i] + its number.
 
     scene: a pyrender.Scene.
+    both: True to draw back faces even where a material does not ask for it.
     Errors: SceneError for too many triangles.
     """
     objects: list[Object] = []
@@ -40,7 +41,7 @@ def numbered(scene: Any) -> tuple[list[Object], list[Surface], NDArray[np.int64]
                 if following + len(triangles) > CODES:
                     raise SceneError(f"the scene has more than {CODES - 1:,} triangles, which is the most that can be numbered")
                 shape = _coloured(primitive, triangles, following)
-                item = None if shape is None else placed_object(shape, silhouette(primitive, WHITE, False), world, True)
+                item = None if shape is None else placed_object(shape, silhouette(primitive, WHITE, both), world, True)
                 if item is not None:
                     objects.append(item)
                     surfaces.append((node, number, instance))

@@ -7,18 +7,18 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
-from urllib.parse import quote
-from weakref import WeakKeyDictionary
+from weakref import WeakKeyDictionary, WeakValueDictionary
 
 import numpy as np
 from pydantic import ValidationError
 
 from glshade.brdfs import BRDFS, Brdf
 from glshade.errors import SceneError
-from glshade.limits import Limits
 from glshade.mesh.reading import gltf_material
 from glshade.mesh.reading.file import MeshFile
 from glshade.pyrender.textures import picture, rgba
+from glshade.textures.pixel_array import PixelArray
+from glshade.textures.texture import Texture
 
 Colour = tuple[float, float, float]
 WHITE: Colour = (1.0, 1.0, 1.0)
@@ -104,31 +104,35 @@ def silhouette(primitive: Any, colour: Colour, both: bool) -> Brdf:
     sides = "both" if both or given.doubleSided else "front"
     if given.alphaMode != "MASK":
         return _silhouette(colour, sides)
-    path = picture(texture, white=True) if texture is not None and primitive.texcoord_0 is not None else None
-    wraps = (texture.sampler.wrapS, texture.sampler.wrapT) if texture is not None else ()
     alpha = float(np.clip((given.diffuseFactor if glossy else given.baseColorFactor)[3], 0, 1))
-    return _silhouette(colour, sides, alpha, float(given.alphaCutoff), path, wraps)
+    plain = _silhouette(colour, sides, alpha, float(given.alphaCutoff))
+    if texture is None or primitive.texcoord_0 is None:
+        return plain
+    holes = picture(texture, white=True)
+    if holes is None:
+        return plain
+    wraps = tuple(gltf_material.WRAP_MODES.get(code, "repeat") for code in (texture.sampler.wrapS, texture.sampler.wrapT))
+    key = plain, holes.digest, wraps
+    found = _cut_out.get(key)
+    if found is None:
+        ka = Texture(texture=holes, factor=colour, wrap=wraps, encoding="linear")
+        found = _cut_out[key] = plain.model_copy(update={"ka": ka})
+    return found
+
+
+# (the material without texture, the digest of the texture with the holes, its wrap modes) -> the silhouette. The values are
+# weak, so that this cache does not keep textures alive that the program has deleted.
+_cut_out: WeakValueDictionary[tuple[Brdf, str, tuple[Any, ...]], Brdf] = WeakValueDictionary()
 
 
 # Cached, because validation is slow. A scene has as many segments as nodes, often thousands.
 @lru_cache(maxsize=4096)
-def _silhouette(
-    colour: Colour,
-    sides: str,
-    alpha: float | None = None,
-    cutoff: float = 0.0,
-    holes: Path | None = None,
-    wraps: tuple[int, ...] = (),
-) -> Brdf:
-    """Returns the material of a silhouette.
+def _silhouette(colour: Colour, sides: str, alpha: float | None = None, cutoff: float = 0.0) -> Brdf:
+    """Returns the material of a silhouette without texture.
 
     alpha: the factor of the alpha of a cut-out; None for a material that is no cut-out.
-    holes: the picture file with the alpha of a cut-out; None if it has no texture.
     """
     keys: dict[str, Any] = {"brdf": "ambient", "ka": colour, "sides": sides}
-    if holes is not None:
-        wrap = [gltf_material.WRAP_MODES.get(code, "repeat") for code in wraps]
-        keys["ka"] = {"texture": str(holes), "factor": colour, "wrap": wrap, "encoding": "linear"}
     if alpha is not None:
         keys |= {"alpha": alpha, "alpha_mode": "mask", "alpha_cutoff": cutoff}
     return BRDFS["ambient"].model_validate(keys)
@@ -142,17 +146,19 @@ def _material(primitive: Any, flat: bool, both: bool, notes: list[str]) -> Brdf:
     given = primitive.material
     name = given.name or ""
     header: dict[str, list[Any]] = {"textures": [], "samplers": [], "images": []}
+    pictures: list[PixelArray] = []
 
     def texture(slot: str) -> dict[str, Any] | None:
         """Returns glTF's textureInfo for a texture of the material; None if the texture or the coordinates are missing."""
         source = getattr(given, slot, None)
-        path = picture(source) if source is not None and primitive.texcoord_0 is not None else None
-        if source is None or path is None:
+        found = picture(source) if source is not None and primitive.texcoord_0 is not None else None
+        if source is None or found is None:
             return None
-        index = len(header["textures"])
+        index = len(pictures)
+        pictures.append(found)
         header["textures"].append({"source": index, "sampler": index})
         header["samplers"].append({"wrapS": source.sampler.wrapS, "wrapT": source.sampler.wrapT})
-        header["images"].append({"uri": quote(str(path))})
+        header["images"].append({"uri": str(index)})
         return {"index": index}
 
     table: dict[str, Any] = {"name": name, "alphaMode": given.alphaMode, "alphaCutoff": given.alphaCutoff}
@@ -183,7 +189,22 @@ def _material(primitive: Any, flat: bool, both: bool, notes: list[str]) -> Brdf:
         table["emissiveFactor"] = (np.clip(np.asarray(given.emissiveFactor, dtype=np.float64), 0, 1) ** 2).tolist()
         maps = {slot: texture(slot) for slot in ("normalTexture", "emissiveTexture", "occlusionTexture")}
         table |= {slot: info for slot, info in maps.items() if info is not None}
-    return _modelled(table, header, flat, both or given.doubleSided, notes)
+    file = _PictureList(Path(ORIGIN), Path(), b"")
+    keys = gltf_material.material(file, header, [], table)
+    # The callers add the prefix again when they give the warnings.
+    notes.extend(note.removeprefix(f"{ORIGIN}: ") for note in file.contents.warnings)
+    for value in keys.values():
+        if isinstance(value, dict):
+            value["texture"] = pictures[int(value["texture"])]
+    return _modelled(keys, flat, both or given.doubleSided)
+
+
+class _PictureList(MeshFile):
+    """A stand-in for a glTF file whose pictures are in a list. The names of its pictures are their numbers in the list."""
+
+    def texture(self, name: str) -> str:
+        """Returns the name of a picture, which is no file."""
+        return name
 
 
 def _is_transparent(alpha: float, texture: Any, primitive: Any) -> bool:
@@ -197,14 +218,9 @@ def _is_transparent(alpha: float, texture: Any, primitive: Any) -> bool:
     )
 
 
-def _modelled(table: dict[str, Any], header: dict[str, Any], flat: bool, both: bool, notes: list[str]) -> Brdf:
-    """Converts a glTF material into glshade's. notes: a list to which the warnings are added. Errors: SceneError."""
-    # The textures are files that textures.picture has written to a temporary folder.
-    file = MeshFile(Path(ORIGIN), Path("/"), b"", limits=Limits(allow_outside=True))
-    keys = gltf_material.material(file, header, [], table)
+def _modelled(keys: dict[str, Any], flat: bool, both: bool) -> Brdf:
+    """Returns the material of a table that the glTF reader has made. Errors: SceneError."""
     keys["sides"] = "both" if both else "front"
-    # The callers add the prefix again when they give the warnings.
-    notes.extend(note.removeprefix(f"{ORIGIN}: ") for note in file.contents.warnings)
     if isinstance(keys.get("roughness"), dict):
         # glTF stores roughness in green and metallicity in blue. pyrender uploads these two channels as red and green. Its
         # shader reads red and green even from a texture whose channels were not moved.

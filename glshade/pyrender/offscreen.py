@@ -171,11 +171,13 @@ class OffscreenRenderer:
                 canvas.resolve()
             return depth if depth_only else (canvas.colour(4 if RenderFlags.RGBA in wanted else 3), depth)
 
-    def normals(self, scene: Any) -> Any:
+    def normals(self, scene: Any, flags: int = RenderFlags.NONE) -> Any:
         """Returns the unit shading normals (H, W, 3) float32 in world space at the pixels' middles, 0 where nothing is drawn.
 
         Normal maps count. Points and lines are drawn, too. To see normals as colours, use `(normals + 1) / 2`.
         scene: a pyrender.Scene.
+        flags: with SKIP_CULL_FACES, back faces are drawn, too; their normals are turned to the side that is visible. Other
+            flags have no effect.
         Errors: SceneError; GlshadeError after `delete`.
         """
         from glshade.assembly.part import Part
@@ -185,7 +187,8 @@ class OffscreenRenderer:
 
         painter, size, camera = self._begin(scene)
         result = np.zeros((size[1], size[0], 3), dtype=np.float32)
-        converted = self._conversion.convert(scene, scene.mesh_nodes, Look(), lambda: screen(camera, size, self.point_size))
+        look = Look(both=RenderFlags.SKIP_CULL_FACES in RenderFlags(int(flags)))
+        converted = self._conversion.convert(scene, scene.mesh_nodes, look, lambda: screen(camera, size, self.point_size))
         for note in converted.notes:
             self._warn(note)
         if converted.objects:
@@ -196,7 +199,7 @@ class OffscreenRenderer:
         # A picture that is upside down is drawn the right way up and turned here.
         return result[::-1] if getattr(camera, "flipped", False) else result
 
-    def faces(self, scene: Any) -> Any:
+    def faces(self, scene: Any, flags: int = RenderFlags.NONE) -> Any:
         """Returns (triangle, surface, surfaces) of what is visible at the pixels' middles.
 
         triangle: (H, W) int32, the number of the triangle in its primitive, from 0; -1 where no triangle is drawn.
@@ -205,13 +208,14 @@ class OffscreenRenderer:
 
         Points and lines are left out, and blended surfaces count as opaque.
         scene: a pyrender.Scene.
+        flags: with SKIP_CULL_FACES, back faces are drawn, too. Other flags have no effect.
         Errors: SceneError, also for more than 16,777,215 triangles; GlshadeError after `delete`.
         """
         from glshade.pyrender.faces import decoded, numbered
         from glshade.pyrender.scene import AS_THEY_ARE
 
         painter, size, camera = self._begin(scene)
-        objects, surfaces, starts = numbered(scene)
+        objects, surfaces, starts = numbered(scene, RenderFlags.SKIP_CULL_FACES in RenderFlags(int(flags)))
         with painter.renderer.context.gl as gl:
             gl.gc()
             canvas = painter.canvas(size, 1, True)

@@ -14,6 +14,7 @@ from glshade.limits import LARGEST_MESH
 from glshade.mesh import file as mesh_file
 from glshade.mesh.mesh import Mesh
 from glshade.scene.scene import Scene
+from glshade.textures.pixel_array import PixelArray
 
 
 def scene_digest(scene: Scene) -> str:
@@ -33,7 +34,7 @@ def scene_digest(scene: Scene) -> str:
             return [*parts, *model.lights]
         if isinstance(value, Path):
             return hashlib.sha256(read_bytes(value, LARGEST_MESH)).hexdigest()
-        if isinstance(value, Mesh):
+        if isinstance(value, Mesh | PixelArray):
             return value.digest
         if isinstance(value, Document):
             return {key: content(item) for key, item in _written(value)}

@@ -237,7 +237,7 @@ class SceneFile:
         self._models = models
         for place, picture in scene.pictures(self._checked):
             path = picture.texture
-            if path in self._probed:
+            if not isinstance(path, Path) or path in self._probed:
                 continue
             try:
                 probe(path)

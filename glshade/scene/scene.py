@@ -156,7 +156,8 @@ class Scene(Document):
         named = [item.mesh for item in self.objects if isinstance(item.mesh, Path)]
         if not named:
             return partial(mesh_file.load, limits=self._limits)
-        folders = {path.parent for path in (*named, *(picture.texture for _, picture in self.pictures()))}
+        pictures = [picture.texture for _, picture in self.pictures()]
+        folders = {path.parent for path in (*named, *pictures) if isinstance(path, Path)}
         return partial(mesh_file.load, limits=self._limits, folders=frozenset(folder.resolve() for folder in folders))
 
     def with_models(self, models: Mapping[Path, Model]) -> "Scene":

@@ -1,7 +1,8 @@
-"""Texels: the arrays that are read from picture files and uploaded as textures, the same for both renderers."""
+"""Texels: the arrays that are read from pictures and uploaded as textures, the same for both renderers."""
 
 from __future__ import annotations
 
+from collections.abc import Hashable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,23 +11,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.image import file as picture_file
-from glshade.textures.texture import BumpMap, Encoding, Filter, Picture, Placement, Texture, WrapMode
+from glshade.image.file import Encoding
+from glshade.textures.pixel_array import PixelArray
+from glshade.textures.texture import BumpMap, Filter, Picture, Placement, Texture, WrapMode
 
 Pixels = NDArray[np.float32]
 
 
 @dataclass(frozen=True)
 class Texels:
-    """A picture file and the way in which it is read. Equal Texels share one texture on the GPU.
+    """A picture and the way in which it is read. Equal Texels share one texture on the GPU.
 
-    path: the picture file.
+    source: the picture file, or the picture in memory.
     given: the wrap modes that the material asks for, along u and along v.
-    encoding: the encoding of the file's colours.
-    heights: whether the file holds heights, from which normals are made for the upload.
+    encoding: the encoding of the picture's colours.
+    heights: whether the picture holds heights, from which normals are made for the upload.
     filter: how texels are filtered where the picture is magnified.
     """
 
-    path: Path
+    source: Path | PixelArray
     given: tuple[WrapMode, WrapMode]
     encoding: Encoding = "linear"
     heights: bool = False
@@ -48,12 +51,25 @@ class Texels:
         u, v = ("repeat" if times == 2 else mode for times, mode in zip(self.span, self.given, strict=True))
         return u, v
 
+    @property
+    def key(self) -> Hashable:
+        """The key of these texels in a cache. It differs after a change of the file, and keeps no picture in memory alive.
+
+        Errors: OSError for a file that does not exist.
+        """
+        source = self.source.digest if isinstance(self.source, PixelArray) else (self.source, self.source.stat().st_mtime_ns)
+        return source, self.given, self.encoding, self.heights, self.filter
+
     def read(self) -> Pixels:
         """Returns the texels (H, W, 4) float32, linear, with straight alpha. Row 0 is the bottom row, as OpenGL expects.
 
         Errors: AssetError.
         """
-        pixels = np.ascontiguousarray(picture_file.read(self.path, self.encoding)[0][::-1])
+        if isinstance(self.source, PixelArray):
+            found = self.source.read(self.encoding)
+        else:
+            found = picture_file.read(self.source, self.encoding)[0]
+        pixels = np.ascontiguousarray(found[::-1])
         return normals(pixels[..., 0], self.given) if self.heights else pixels
 
 

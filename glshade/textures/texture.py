@@ -3,12 +3,14 @@
 import math
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, PlainSerializer, SkipValidation, Tag, WithJsonSchema
 
 from glshade.document import Document, File, Finite, Triple, fault
+from glshade.image.file import Encoding
+from glshade.textures.pixel_array import PixelArray
 
 WrapMode = Literal["repeat", "clamp", "mirror"]
-Encoding = Literal["auto", "srgb", "linear"]
 Filter = Literal["smooth", "nearest"]
 # The two rows of the matrix from a mesh's texture coordinates (u, v, 1) to a picture's.
 Placement = tuple[tuple[float, float, float], tuple[float, float, float]]
@@ -46,13 +48,38 @@ Scale = Annotated[
 ]
 
 
-class Picture(Document):
-    """A picture file that is placed on a surface by texture coordinates. v = 0 is its bottom row.
+def _pixels(value: Any) -> Any:
+    """Returns a PixelArray for an array, and other values as they are."""
+    if not isinstance(value, np.ndarray):
+        return value
+    try:
+        return PixelArray.of(value)
+    except ValueError as error:
+        raise fault(str(error)) from None
 
-    The picture is read at uv_offset + turned(uv_scale * uv), where uv are the mesh's texture coordinates.
+
+def _source_branch(value: Any) -> str:
+    """Returns the tag of the union branch that validates the value. The tags are those of `document.BRANCHES`."""
+    return "<value>" if isinstance(value, PixelArray) else "<texture-table>"
+
+
+# A picture file or, in Python, an array of pixels.
+PictureSource = Annotated[
+    Annotated[SkipValidation[PixelArray], Tag("<value>")] | Annotated[File, Tag("<texture-table>")],
+    Discriminator(_source_branch),
+    PlainSerializer(lambda value: value.digest if isinstance(value, PixelArray) else str(value), when_used="json"),
+    WithJsonSchema({"type": "string", "format": "path"}),
+]
+
+
+class Picture(Document):
+    """A picture that is placed on a surface by texture coordinates. v = 0 is its bottom row.
+
+    It is a file or, in Python, a NumPy array of pixels, as `PixelArray.of` takes it. The picture is read at
+    uv_offset + turned(uv_scale * uv), where uv are the mesh's texture coordinates.
     """
 
-    texture: File = Field(description="picture file")
+    texture: Annotated[PictureSource, BeforeValidator(_pixels)] = Field(description="picture file")
     wrap: Wrap = Field(("repeat", "repeat"), description="how the picture continues outside [0, 1], along u and along v")
     filter: Filter = Field(
         "smooth",

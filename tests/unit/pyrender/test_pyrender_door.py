@@ -9,7 +9,7 @@ import pytest
 
 from glshade import GlshadeError, SceneError
 from glshade.errors import AssetWarning
-from glshade.pyrender import OffscreenRenderer
+from glshade.pyrender import OffscreenRenderer, RenderFlags
 
 pyrender = pytest.importorskip("pyrender", reason="the extra pyrender is not installed")
 
@@ -91,6 +91,23 @@ def test_faces_and_normals(door: Any) -> None:
     assert surfaces == [(next(iter(made.mesh_nodes)), 0, 0)]
     assert door.normals(made)[15, 25] == pytest.approx([0, 0, 1], abs=1e-6)
     assert not door.normals(made)[0, 0].any()
+
+
+def test_faces_and_normals_show_back_faces_when_asked(door: Any) -> None:
+    """Scripts that sample open meshes draw depth with SKIP_CULL_FACES, and the normals have to cover the same pixels."""
+    made = pyrender.Scene()
+    turned = pyrender.Primitive(positions=SQUARE, indices=FACES[:, ::-1], normals=np.tile([0.0, 0, -1], (4, 1)))
+    made.add(pyrender.Mesh([turned]))
+    made.add(Own(WEAK))
+    assert not door.normals(made).any()
+    assert (door.faces(made)[1] == -1).all()
+    drawn = door.render(made, RenderFlags.DEPTH_ONLY | RenderFlags.SKIP_CULL_FACES) > 0
+    normals = door.normals(made, RenderFlags.SKIP_CULL_FACES)
+    assert covered(drawn) == covered(normals.any(axis=2)) == [10, 19, 20, 29]
+    np.testing.assert_allclose(normals[drawn], np.tile([0.0, 0, 1], (100, 1)), atol=1e-6)
+    triangle, surface, _ = door.faces(made, RenderFlags.SKIP_CULL_FACES)
+    assert covered(surface + 1) == [10, 19, 20, 29]
+    assert (triangle[18, 28], triangle[11, 21]) == (0, 1)
 
 
 def test_triangles_that_are_not_finite_are_counted(door: Any) -> None:
