@@ -97,18 +97,24 @@ class OSMesa:
         return _current.__dict__.get("context")
 
     def restore(self, current: OSMesa | None) -> None:
-        """Makes a context current again, or none."""
+        """Makes a context current again.
+
+        Without one, the context stays current: every context is entered before it is used, and one thread at a time uses it.
+        Without any current context, OSMesa crashes where a driver of EGL does nothing.
+        """
         if current is not None:
             current._make_current()
-        else:
-            self._library.OSMesaMakeCurrent(None, None, 0, 0, 0)
-            _current.context = None
 
     def release(self) -> None:
         """Destroys the context."""
         if self._context:
+            before = self.current()
+            # Mesa takes a context's objects apart in the context that is current.
+            self._make_current()
             self._library.OSMesaDestroyContext(self._context)
-            self._context = None
+            self._context = _current.context = None
+            if before is not None and before is not self:
+                before._make_current()
 
 
 if __name__ == "__main__":
