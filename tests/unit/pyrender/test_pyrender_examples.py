@@ -169,6 +169,7 @@ FIGURES = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", FIGURES)
 def test_colours_differ_by_the_stated_figures(drawn: Any, kind: str) -> None:
     theirs, ours = (drawn[f"{kind} colour {who}"].astype(int) for who in ("theirs", "ours"))

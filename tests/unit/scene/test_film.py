@@ -127,6 +127,7 @@ class TestCrop:
                 image = reference.render(on(scene, crop=crop))
                 assert (image.corner, image.whole) == (crop[:2], SIZE)
 
+    @pytest.mark.slow
     def test_it_is_verified(self, renderer: Renderer, textured: Scene, layered: Scene) -> None:
         for scene in (textured, layered):
             smooth = verify(on(scene, crop=CROPS[0], supersample=2, samples=4), renderer=renderer, max_ambiguous=1)
