@@ -10,6 +10,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from glshade.errors import GlshadeError
 
 # The cache folder is pruned when it holds more than this [bytes].
 LIMIT = 512 << 20
@@ -40,6 +44,22 @@ def read_bytes(path: str | Path, largest: int) -> bytes:
     if data is None or len(data) > largest:
         raise OSError(errno.EFBIG, f"is larger than {largest:,} bytes, the most that is read")
     return data
+
+
+def read_text(path: Path, largest: int, error: type[GlshadeError]) -> str:
+    """Returns the text of a file in UTF-8, with or without a byte order mark.
+
+    largest: the size above which the file is refused [bytes].
+    error: the class of the error that is raised, in one line that starts with the path, where the file cannot be read.
+    """
+    try:
+        return read_bytes(path, largest).decode("utf-8-sig")
+    except FileNotFoundError:
+        raise error(f"{path}: there is no such file") from None
+    except UnicodeDecodeError as fault:
+        raise error(f"{path}: is not UTF-8 text (byte {fault.start})") from None
+    except OSError as fault:
+        raise error(f"{path}: cannot be read: {fault.strerror}") from None
 
 
 def _check_mode(mode: int) -> None:

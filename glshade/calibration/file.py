@@ -15,7 +15,7 @@ from glshade.files import replacing
 def write(path: Path, pictures: Sequence[CalibratedPicture], name: str) -> None:
     """Writes the cameras of pictures. Each file is written whole or not at all.
 
-    path: the file, or the folder for the formats that write several files, . Its folder is made if it is missing.
+    path: the file, or the folder for the formats that write several files. A folder that is missing is made.
     name: the name of the format, a key of FORMATS.
     Errors: GlshadeError, also where the format cannot hold one of the cameras.
     """

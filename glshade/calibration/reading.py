@@ -16,7 +16,7 @@ from glshade.arrays import Float64
 from glshade.calibration.calibration import Calibration
 from glshade.calibration.rotation import pose_of
 from glshade.errors import AssetError
-from glshade.files import read_bytes
+from glshade.files import read_text
 from glshade.limits import LARGEST_CAMERAS
 
 # The longest side of a picture that a camera may describe [pixels]. Whether it can be drawn is decided later, by the film.
@@ -43,14 +43,7 @@ def at(path: Path, name: object) -> Iterator[None]:
 
 def text(path: Path) -> str:
     """Returns the text of a file. Errors: AssetError."""
-    try:
-        return read_bytes(path, LARGEST_CAMERAS).decode("utf-8-sig")
-    except FileNotFoundError:
-        raise AssetError(f"{path}: there is no such file") from None
-    except UnicodeDecodeError as error:
-        raise AssetError(f"{path}: is not UTF-8 text (byte {error.start})") from None
-    except OSError as error:
-        raise AssetError(f"{path}: cannot be read: {error.strerror}") from None
+    return read_text(path, LARGEST_CAMERAS, AssetError)
 
 
 def table(path: Path) -> dict[str, Any]:

@@ -152,7 +152,7 @@ class Context:
         return ctypes.CFUNCTYPE(result, *arguments)(address) if address else None
 
     def leave(self) -> None:
-        """Makes no context current in this thread, so that any thread may enter this one."""
+        """Lets other threads enter a new context, which is current in the thread that made it."""
         if self._window is not None:
             self._window.leave()
 

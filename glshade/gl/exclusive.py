@@ -46,7 +46,7 @@ class Currency(Protocol):
         """Returns what `restore` needs to make the context current again that is current now, or none."""
 
     def restore(self, current: Any) -> None:
-        """Makes a context current again, or none."""
+        """Makes a context current again. For None, no context stays current if the platform bears that."""
 
 
 class Exclusive:
@@ -81,7 +81,7 @@ class Exclusive:
             self._lock.release()
 
     def leave(self) -> None:
-        """Makes no context current in this thread. A new context is current in the thread that made it."""
+        """Lets other threads enter a new context, which is current in the thread that made it."""
         self._currency.restore(None)
 
     def release(self) -> None:

@@ -122,8 +122,9 @@ class Surfaces:
         return np.where(same[:, None], self.light, light)
 
     def parts(self) -> tuple[Array, Array]:
-        """Returns (all light, specular light), (L + 1, K, 3) each: what each of the L lights adds to the pixels, and last what
-        the surfaces emit.
+        """Returns (all light, specular light), an array (L + 1, K, 3) each.
+
+        The first L rows hold the light that each of the L lights adds to the K pixels. The last row holds the emission.
         """
         lights = len(self.assembly.lights)
         every, specular = (np.zeros((lights + 1, len(self.pixel), 3)) for _ in range(2))

@@ -42,7 +42,7 @@ def with_tangents(mesh: Mesh, axes: Axes = OWN_AXES) -> Mesh:
         return replace(mesh, tangents=np.column_stack([t, np.ones(len(t))]).astype(np.float32))
 
     weighted, mirrored = _along_u(mesh, mesh.uvs.astype(np.float64) @ np.array(axes).T)
-    # Each vertex is there once for the triangles that are mirrored, and once for the others.
+    # A vertex is split in two if some of its triangles are mirrored and others are not.
     pair = mesh.triangles.reshape(-1).astype(np.int64) << 1 | np.repeat(mirrored, 3)
     occurs = np.zeros(2 * len(mesh.positions), dtype=np.bool_)
     occurs[pair] = True

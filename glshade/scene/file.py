@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from glshade.document import nearest
 from glshade.errors import AssetError, AssetWarning, SceneError
-from glshade.files import read_bytes
+from glshade.files import read_text
 from glshade.image.file import probe
 from glshade.limits import DEFAULT, LARGEST_SCENE, MOST_FAULTS, Limits
 from glshade.mesh import file as mesh_file
@@ -330,14 +330,7 @@ def parse(data: Any, path: Path, limits: Limits = DEFAULT) -> Scene:
 
 def _read(path: Path) -> Any:
     """Returns the content of a TOML or JSON file. Errors: SceneError."""
-    try:
-        text = read_bytes(path, LARGEST_SCENE).decode("utf-8-sig")
-    except FileNotFoundError:
-        raise SceneError(f"{path}: there is no such file") from None
-    except OSError as error:
-        raise SceneError(f"{path}: cannot be read: {error.strerror}") from None
-    except UnicodeDecodeError as error:
-        raise SceneError(f"{path}: is not UTF-8 text (byte {error.start})") from None
+    text = read_text(path, LARGEST_SCENE, SceneError)
     is_toml = path.suffix.lower() == ".toml"
     try:
         if is_toml and LONG_KEY.search(text):

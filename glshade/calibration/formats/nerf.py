@@ -15,11 +15,11 @@ from glshade.calibration.calibration import CalibratedPicture, Calibration
 from glshade.calibration.formats import CameraFormat
 from glshade.calibration.reading import Fault, at, camera, number, numbers, pixels, pose, rows, table
 
-# The names of nerfstudio's camera models that have no distortion.
+# nerfstudio has these names for the camera models without distortion.
 MODELS = {"perspective": "PINHOLE", "orthographic": "ORTHOPHOTO"}
-# The coefficients of a lens's distortion.
+# These keys hold the coefficients of a lens's distortion.
 DISTORTIONS = ("k1", "k2", "k3", "k4", "p1", "p2")
-# The keys that describe a picture's pixels.
+# These keys describe the pixels of a picture.
 INTRINSICS = ("w", "h", "fl_x", "fl_y", "cx", "cy", "camera_model")
 
 
