@@ -84,13 +84,15 @@ class Point:
 
     @classmethod
     def from_dict(cls, data: dict[str, Any]) -> Point:
-        """Returns the point whose `as_dict` gave the data. Errors: KeyError, TypeError for other data."""
+        """Returns the point whose `as_dict` gave the data. Errors: KeyError, TypeError, ValueError for other data."""
 
         def read_errors(values: dict[str, Any]) -> Errors:
             return Errors(**{**values, "at": tuple(values["at"])})
 
         kinds = {kind: read_errors(values) for kind, values in data["by_kind"].items()}
         timing = Timing(**data["seconds"])
+        if not timing.low > 0:
+            raise ValueError("a time is not positive")
         return cls(Setting(**data["setting"]), timing, data["vertices"], read_errors(data["total"]), kinds)
 
 
@@ -264,7 +266,8 @@ def timed(
 
     The scenes are drawn in turn. A machine's speed changes from minute to minute. So each time is divided by the median of its
     turn, and the medians of these ratios are scaled to the time of the exact scene. The range of a median over n turns extends
-    1.57 IQR / sqrt(n) to either side, where IQR is the interquartile range (McGill, Tukey and Larsen 1978).
+    1.57 IQR / sqrt(n) to either side, where IQR is the interquartile range (McGill, Tukey and Larsen 1978), but not beyond the
+    smallest and the largest ratio, so that it never reaches times of zero or less.
 
     repeat: the number of turns.
     unit: optional, the time of the exact scene [s]; by default, its median over these turns.
@@ -275,7 +278,8 @@ def timed(
     middle, low, high = np.quantile(shares, (0.5, 0.25, 0.75), axis=0)
     scale = (float(np.median(seconds[:, 0])) if unit is None else unit) / middle[0]
     reach = 1.57 * (high - low) / repeat**0.5
-    return [Timing(*map(float, t * scale)) for t in np.stack([middle, middle - reach, middle + reach], axis=1)]
+    least, most = np.maximum(middle - reach, shares.min(axis=0)), np.minimum(middle + reach, shares.max(axis=0))
+    return [Timing(*map(float, t * scale)) for t in np.stack([middle, least, most], axis=1)]
 
 
 def _batches(items: list[Setting], size: int) -> Iterator[list[Setting]]:

@@ -25,7 +25,7 @@ from glshade.tradeoff import page
 from glshade.tradeoff import study as studies
 from glshade.tradeoff.front import Timing, dominated, ties
 from glshade.tradeoff.setting import EXACT, KINDS, Setting, space
-from glshade.tradeoff.study import Point, Study, study
+from glshade.tradeoff.study import Point, Study, study, timed
 from glshade.verification.candidates import surfaces
 
 Array = np.ndarray[Any, Any]
@@ -667,3 +667,32 @@ def test_real_times_on_the_whole_space(renderer: Any) -> None:
     assert any(s.shading == "phong" for s in front)
     assert all(p.total.max_abs > 0.05 for p in result.points if p.setting.shading != "phong" and p.setting.refine is None)
     assert all(p.total.max_abs <= sum(e.max_abs for e in p.by_kind.values()) + 1e-9 for p in result.points)
+
+
+class Stopwatch:
+    """A stand-in for a renderer, whose drawings take given times [s]."""
+
+    def __init__(self, times: list[float]) -> None:
+        self._times = iter(times)
+
+    def drawing(self, _: Any) -> Any:
+        return lambda: next(self._times)
+
+
+@given(st.lists(st.floats(1e-6, 1e3), min_size=12, max_size=12))
+def test_no_time_is_below_zero(times: list[float]) -> None:
+    """However noisy the machine is, the range of a time is positive and holds the median, so that a chart can show it."""
+    scene: Any = None
+    for timing in timed(scene, [scene, scene], Stopwatch(times), repeat=4):  # type: ignore[arg-type]
+        assert 0 < timing.low <= timing.median * (1 + 1e-12)
+        assert timing.median <= timing.high * (1 + 1e-12)
+
+
+def test_kept_times_below_zero_are_measured_again(found: dict[str, Study], tmp_path: Path) -> None:
+    """A file of measurements with a range that reaches below zero counts as broken, so that the study measures anew."""
+    point, head = found["tight"].points[0], {"digest": "a"}
+    kept = tmp_path / "measured.json"
+    for low, known in ((point.timing.low, 1), (-1e-6, 0)):
+        changed = replace(point, timing=replace(point.timing, low=low))
+        studies._write(kept, head, {point.setting: changed})
+        assert len(studies._read(kept, head)) == known
