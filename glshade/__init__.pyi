@@ -23,6 +23,7 @@ from glshade.image.difference import compare as compare
 from glshade.image.image import Image as Image
 from glshade.image.layers import Layers as Layers
 from glshade.lights import LIGHTS as LIGHTS
+from glshade.mesh.copies import Copies as Copies
 from glshade.mesh.mesh import Mesh as Mesh
 from glshade.pyrender import from_pyrender as from_pyrender
 from glshade.scene.camera import Orthographic as Orthographic

@@ -32,7 +32,7 @@ from glshade.files import check_regular
 from glshade.limits import MOST_FAULTS
 
 # pydantic puts these names of union branches in the path of an error. They are removed, since the author never wrote them.
-BRANCHES = frozenset({"<value>", "<texture-table>", "<shorthand>", "<table>"})
+BRANCHES = frozenset({"<value>", "<texture-table>", "<spectrum-table>", "<shorthand>", "<table>"})
 
 # pydantic's error type -> the message, in the words of a scene file. pydantic itself would ask for "a valid dictionary".
 KINDS = {
@@ -164,6 +164,16 @@ class Document(BaseModel):
         return ()
 
 
+class AsIs:
+    """Annotates a type whose values are taken as they are, like pydantic's SkipValidation.
+
+    pydantic's own first reads the fields of a type that is a dataclass, which takes 5 ms for a mesh at the start of a command.
+    """
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.any_schema()
+
+
 class Chosen:
     """Annotates a field whose class is chosen by one key of its table: `brdf = "phong"`, `type = "spot"`.
 
@@ -212,6 +222,25 @@ class Chosen:
         if self.shorthand:
             choices.append({"enum": list(self.models)})
         return {"anyOf": choices}
+
+
+class Shorthand:
+    """Annotates a table in whose place the file may have a string or a path: the value of one of its keys.
+
+    key: the key.
+    """
+
+    def __init__(self, key: str) -> None:
+        self.key = key
+
+    def _table(self, data: Any) -> Any:
+        return {self.key: data} if isinstance(data, str | Path) else data
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> core_schema.CoreSchema:
+        return core_schema.no_info_before_validator_function(self._table, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"anyOf": [{"type": "string"}, handler(schema)]}
 
 
 def number(value: Any) -> Any:

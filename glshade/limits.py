@@ -17,6 +17,8 @@ LARGEST_CAMERAS = 256 << 20
 LARGEST_SHADER = 1 << 20
 # A mesh file is read as a whole into memory.
 LARGEST_MESH = 4 << 30
+# A file of measured reflectance: one of the MERL database has 35 MB. As text, 32 MiB hold 100,000 samples of 31 wavelengths.
+LARGEST_MEASURED, LARGEST_MEASURED_TEXT = 64 << 20, 32 << 20
 
 # The nesting of lists and tables in a document. The deepest value of the format, a number of a matrix, lies at depth 6.
 DEEPEST_DOCUMENT = 64

@@ -59,6 +59,11 @@ class Lru(Generic[Key, Value]):
             self.put(key, found, size(found))
         return found
 
+    def newest_first(self) -> list[tuple[Key, Value]]:
+        """Returns all keys and values, those that were used last first. They do not count as used."""
+        with self._lock:
+            return [(key, value) for key, (value, _) in reversed(self._kept.items())]
+
     def drop(self, key: Key) -> None:
         """Removes a key and its value, if the key has one."""
         with self._lock:

@@ -14,6 +14,8 @@ from typing import Any
 from glshade.brdfs import BRDFS, Brdf
 from glshade.document import Document
 from glshade.lights import LIGHTS, Light
+from glshade.optics.reradiation import Reradiation
+from glshade.optics.spectra import Spectrum
 from glshade.scene.animation import Track
 from glshade.scene.camera import CAMERAS, Camera
 from glshade.scene.film import Film
@@ -71,6 +73,9 @@ NAMED = {
     ("Film", "background"): "3 or 4 numbers",
     ("Film", "crop"): "4 integers",
     ("Film", "ocio"): "file, or `ocio://NAME`",
+    ("Film", "white"): "[spectrum](#spectra), or its name alone",
+    ("Brdf", "reradiation"): "[reradiation](#reradiation), or its file alone",
+    ("Spectrum", "spectrum"): "file, name, or list of pairs of numbers",
 }
 TABLES = {
     "Texture": "[texture](#textures)",
@@ -78,6 +83,8 @@ TABLES = {
     "BumpMap": "[bump map](#bump-maps)",
     "DirectionMap": "[direction map](#direction-maps)",
     "OcclusionMap": "[occlusion map](#occlusion-maps)",
+    "Spectrum": "[spectrum](#spectra)",
+    "Reradiation": "[reradiation](#reradiation), or its file alone",
 }
 SAID = {
     ("Scene", "film"): "size, samples, background and encoding of the picture",
@@ -204,6 +211,7 @@ def scene_file() -> str:
     text += section(3, "Textures", Texture) + section(3, "Normal maps", NormalMap)
     text += section(3, "Bump maps", BumpMap) + section(3, "Direction maps", DirectionMap)
     text += section(3, "Occlusion maps", OcclusionMap)
+    text += section(3, "Spectra", Spectrum) + section(3, "Reradiation", Reradiation)
     text += section(2, "Lights", Light)
     for name in LIGHTS:
         text += section(3, f"`{name}`", LIGHTS[name], Light)

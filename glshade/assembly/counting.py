@@ -9,6 +9,7 @@ from glshade.brdfs import Brdf
 from glshade.errors import SceneError
 from glshade.image import file as picture_file
 from glshade.limits import MOST_INSTANCES, TEXELS_PER_BYTE, UNLIMITED, Limits
+from glshade.mesh.copies import Copies
 from glshade.mesh.mesh import Mesh
 from glshade.mesh.model import Model
 from glshade.scene.object import Object, Rate
@@ -38,8 +39,10 @@ def check_counts(scene: Scene, load: Callable[[Path], Model], shading: Rate | No
             parts += len(model.parts)
             made += times * sum(_triangle_count(part.mesh) for part in model.parts)
         elif item.mesh is not None or item.shape is not None:
-            parts += 1
-            made += times * (item.shape.triangle_count if item.shape else _triangle_count(item.mesh) if item.mesh else 0)
+            copies = len(item.mesh.poses) if isinstance(item.mesh, Copies) else 1
+            parts += copies
+            mesh = item.own_mesh
+            made += copies * times * (item.shape.triangle_count if item.shape else _triangle_count(mesh) if mesh else 0)
     made -= sum(stored.values())
     if made > scene.limits.max_triangles:
         raise SceneError(

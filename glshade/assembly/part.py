@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from glshade.assembly.assembly import WHITE, Assembly, own_colour
-from glshade.assembly.instance import Instance
+from glshade.assembly.instance import Instance, Share
 from glshade.brdfs import BLACK, Brdf
 from glshade.scene.scene import Scene
 
@@ -25,14 +25,15 @@ class Part:
         "specular": all light without diffuse lobes, ambient light and emission;
         "dark": no light, so that only the background is left;
         "albedo": the surfaces' base colours;
+        "spectrum": all light, in three of the bands of the layer `spectrum`;
         "depth": depth of the nearest surface at the pixel's middle, and the number of its instance in the assembly;
         "uv": texture coordinates of the nearest surface at the pixel's middle;
         "normal": shading normal of the nearest surface at the pixel's middle.
         For the last three, blended surfaces count as opaque.
-    light: for the kind "light", index of the light in the assembly's lights.
+    light: for the kind "light", index of the light in the assembly's lights; for "spectrum", index of the first band.
     """
 
-    kind: Literal["lit", "light", "emission", "specular", "dark", "albedo", "depth", "uv", "normal"]
+    kind: Literal["lit", "light", "emission", "specular", "dark", "albedo", "spectrum", "depth", "uv", "normal"]
     light: int = 0
 
     def scene(self, scene: Scene) -> Scene:
@@ -49,6 +50,8 @@ class Part:
 
     def of(self, assembly: Assembly) -> Assembly:
         """Returns the assembly whose picture is the part."""
+        if self.kind == "spectrum":
+            return assembly.of_bands(self.light)
         instances = tuple(self._instance(number, item, assembly) for number, item in enumerate(assembly.instances))
         return replace(assembly, instances=instances, lights=(WHITE,) if self.kind == "albedo" else assembly.lights)
 
@@ -60,16 +63,25 @@ class Part:
         """
         if self.kind == "lit":
             return instance
+        assert self.kind != "spectrum", "a spectrum replaces the whole assembly"
         if self.kind == "emission":
-            return replace(instance, lights=tuple(i for i in instance.lights if i == assembly.own_light))
+            # Of the shares of an instance, the first one emits.
+            first = instance.parts[0]
+            return replace(first, lights=tuple(i for i in first.lights if i == assembly.own_light))
         # Each further part shows the surface without its emission.
-        instance = replace(instance, material=instance.material.model_copy(update={"emission": BLACK}))
+        if instance.shares and self.kind in ("light", "specular"):
+            parts = (self._instance(number, part, assembly) for part in instance.parts)
+            return replace(instance, shares=tuple(Share(part.material, part.lights, part.weights) for part in parts))
+        instance = replace(instance, material=instance.material.model_copy(update={"emission": BLACK}), shares=())
         if self.kind == "dark":
             return replace(instance, lights=())
         if self.kind == "light":
             return replace(instance, lights=tuple(i for i in instance.lights if i == self.light))
         if self.kind == "albedo":
-            return replace(instance, material=own_colour(instance.material), lights=(0,))
+            own = instance.material
+            if assembly.illumination and instance.written and not instance.written.unlit:
+                own = assembly.illumination.albedo(instance.written)
+            return replace(instance, material=own_colour(own), lights=(0,))
         if self.kind == "specular":
             material = instance.material.specular_part()
             directed = tuple(i for i in instance.lights if not assembly.lights[i].omnidirectional)

@@ -1,9 +1,13 @@
-"""Strokes: turns points and lines into triangles that face the viewer, with sizes in pixels."""
+"""Strokes: turns points and lines into triangles that face the viewer, with sizes in pixels.
+
+A driver that draws points by itself gets the centres of the squares instead, one vertex for each point.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -11,13 +15,15 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.arrays import Float32, UInt32
 from glshade.mesh.mesh import Mesh
+from glshade.mesh.strokes import DirectedPoints
 from glshade.mesh.welding import normalised
 from glshade.scene.camera import View
 from glshade.scene.scene import Scene
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+Indices = NDArray[np.integer[Any]]
 Flags = NDArray[np.bool_]
 
 # The number of strokes that are turned into triangles at once. The intermediate arrays of so many take about 30 MB, and fit
@@ -69,7 +75,7 @@ def has_strokes(scene: Scene) -> bool:
     """Returns whether a scene draws points or lines. Errors: AssetError for a mesh file that cannot be read."""
     load = scene.loader()
     for item in scene.objects:
-        meshes = [part.mesh for part in load(item.mesh).parts] if isinstance(item.mesh, Path) else [item.mesh]
+        meshes = [part.mesh for part in load(item.mesh).parts] if isinstance(item.mesh, Path) else [item.own_mesh]
         if any(mesh is not None and mesh.strokes is not None for mesh in meshes):
             return True
     return False
@@ -81,6 +87,7 @@ def stroked(mesh: Mesh, world: Array, screen: Viewport) -> Mesh:
     The same object is returned for the same mesh, transform and viewport, as long as no other viewport was asked for. Strokes
     outside the picture are left out; where none is left, the mesh has one triangle without area. The origin of the mesh is the
     eye, so that float32 resolves a pixel at every depth. Normals turn to the viewer, and stand in for those that are missing.
+    A mesh of points alone is faceted: each square has the normal of its point, and is shaded at its centre.
 
     mesh: a mesh with `strokes`.
     world: (4, 4), from the mesh's space to world space.
@@ -92,14 +99,141 @@ def stroked(mesh: Mesh, world: Array, screen: Viewport) -> Mesh:
         _drawn[mesh] = screen.key, made
     place = world.tobytes()
     if place not in made:
-        made[place] = _stroked(mesh, world, screen)
+        made[place] = Squares.of_points(Points(mesh, world, screen)) if is_points(mesh) else _stroked(mesh, world, screen)
     return made[place]
 
 
-def _stroked(mesh: Mesh, world: Array, screen: Viewport) -> Mesh:
-    """Returns what `stroked` does, without a cache."""
+def is_points(mesh: Mesh) -> bool:
+    """Returns whether a mesh consists of points alone."""
+    return mesh.strokes is not None and bool((mesh.strokes[:, 0] == mesh.strokes[:, 1]).all())
+
+
+class Points:
+    """Points as a GPU draws them: each has one vertex, the centre of its square.
+
+    mesh: the mesh of the points.
+    world: (4, 4), from the mesh's space to world space.
+    screen: the picture in which the squares have their size.
+    """
+
+    def __init__(self, mesh: Mesh, world: Array, screen: Viewport) -> None:
+        self.mesh, self.world, self.screen = mesh, world, screen
+
+    @property
+    def count(self) -> int:
+        """The number of points."""
+        return 0 if self.mesh.strokes is None else len(self.mesh.strokes)
+
+    @property
+    def are_squares(self) -> bool:
+        """Whether all points are squares of the same size in the picture, as a driver draws them.
+
+        Between the pixels' edges, a square whose side is no whole number of pixels becomes a rectangle.
+        """
+        return not self.screen.on_grid or self.screen.point_size.is_integer()
+
+    @property
+    def order(self) -> UInt32 | None:
+        """The vertices (S,) in the order in which they are drawn; None where all are drawn once, one after the other."""
+        assert self.mesh.strokes is not None
+        order = self.mesh.strokes[:, 0]
+        in_turn = len(order) == len(self.mesh.positions) and bool((order[1:] == order[:-1] + 1).all())
+        return None if in_turn and not order[0] else np.ascontiguousarray(order)
+
+    @cached_property
+    def centres(self) -> Float32:
+        """(V, 3), the centres of the squares in world space, relative to the eye."""
+        result = np.empty(self.mesh.positions.shape, dtype=np.float32)
+        turned = self.world[:3, :3].T
+        offset = self.mesh.origin @ turned + self.world[:3, 3]
+        for start in range(0, len(result), BATCH):
+            rows = slice(start, start + BATCH)
+            positions = self.mesh.positions[rows] @ turned + offset
+            result[rows] = _centred_on_grid(self.screen, positions) - self.screen.view.eye
+        return _owned(result)
+
+    @cached_property
+    def normals(self) -> Float32:
+        """(V, 3), the unit normals in world space; the direction to the viewer where there is none.
+
+        Unless they are directed, they are on the viewer's side.
+        """
+        view, given = self.screen.view, self.mesh.normals
+        result = np.empty(self.mesh.positions.shape, dtype=np.float32)
+        result[:] = view.axes[2]
+        for start in range(0, len(result), BATCH) if given is not None else ():
+            rows = slice(start, start + BATCH)
+            facing = result[rows].astype(np.float64)
+            if view.perspective:
+                facing = normalised(-self.centres[rows].astype(np.float64))[0]
+            own = given[rows] if given is not None else facing
+            result[rows] = self._directed(own, facing) if own.any() else facing
+        return _owned(result)
+
+    def _directed(self, normals: NDArray[Any], facing: Array) -> Array:
+        """Returns normals (N, 3) in world space, from those of the mesh. facing: (N, 3), the directions to the viewer."""
+        linear = self.world[:3, :3]
+        if not isinstance(self.mesh, DirectedPoints):
+            return _turned(normals @ _cofactors(linear), facing)
+        unit, length = normalised(normals @ (_cofactors(linear) * np.linalg.slogdet(linear)[0]))
+        return np.where(length[:, None] > 0, unit, facing)
+
+    def array(self, name: str) -> Float32 | None:
+        """Returns the values (V, n) of the vertices for an array of `Mesh`; None if the points have none."""
+        if name in ("positions", "centroids"):
+            return self.centres
+        if name == "normals":
+            return self.normals
+        return {"uvs": self.mesh.uvs, "colours": self.mesh.colours}.get(name.removeprefix("centroid_"))
+
+
+# The arrays of `Mesh` that the squares of points may have, except their corners.
+_OF_POINTS = ("normals", "uvs", "colours", "centroids", "centroid_uvs", "centroid_colours")
+
+
+class Squares(Mesh):
+    """The squares of points. Their arrays are made when somebody asks for one; a driver that draws points by itself does not.
+
+    points: the points; None for a changed copy, whose arrays are there already.
+    """
+
+    points: Points | None = None
+
+    @classmethod
+    def of_points(cls, points: Points) -> Squares:
+        """Returns the squares of points."""
+        squares = object.__new__(cls)
+        vars(squares).update(points=points, origin=points.screen.view.eye)
+        return squares
+
+    @property
+    def counts(self) -> tuple[int, int]:
+        return super().counts if self.points is None else (4 * self.points.count, 2 * self.points.count)
+
+    @cached_property
+    def _made(self) -> Mesh:
+        assert self.points is not None
+        return _stroked(self.points.mesh, self.points.world, self.points.screen, self.points)
+
+
+def _delegated(name: str) -> Any:
+    """Returns the property of `Squares` that takes an array from the mesh that was made."""
+    made: Any = cached_property(lambda squares: getattr(squares._made, name))
+    made.__set_name__(Squares, name)
+    return made
+
+
+for _name in ("positions", "triangles", *_OF_POINTS):
+    setattr(Squares, _name, _delegated(_name))
+
+
+def _stroked(mesh: Mesh, world: Array, screen: Viewport, points: Points | None = None) -> Mesh:
+    """Returns what `stroked` does, without a cache. points: the points if the mesh consists of points alone."""
     assert mesh.strokes is not None
+    names = [name for name in _OF_POINTS if points and points.array(name) is not None]
     given = {name: getattr(mesh, name) for name in ("normals", "uvs", "colours") if getattr(mesh, name) is not None}
+    if points:
+        given = {name: points.array(name) for name in names}
     widths = {"positions": 3, "normals": 3, **{name: values.shape[1] for name, values in given.items()}}
     # The memory of rows that are never written is not taken.
     arrays = {name: np.empty((4 * len(mesh.strokes), width), dtype=np.float32) for name, width in widths.items()}
@@ -112,7 +246,7 @@ def _stroked(mesh: Mesh, world: Array, screen: Viewport) -> Mesh:
         written["positions"] = made.vertices - screen.view.eye
         for name, values in given.items():
             at_ends = values[vertices]
-            if name == "normals":
+            if name == "normals" and not points:
                 normals = made.interpolated(at_ends @ _cofactors(world[:3, :3]))
                 written[name] = _turned(normals, _toward_viewer(screen.view, made.vertices))
             else:
@@ -130,7 +264,7 @@ def _stroked(mesh: Mesh, world: Array, screen: Viewport) -> Mesh:
 def _batches(mesh: Mesh, world: Array, screen: Viewport) -> Iterator[tuple[Strips, Indices]]:
     """Yields the corners of strokes that may be visible, and the vertices (V,) of the mesh to which their ends refer."""
     assert mesh.strokes is not None
-    of_points = bool((mesh.strokes[:, 0] == mesh.strokes[:, 1]).all())
+    of_points = is_points(mesh)
     for start in range(0, len(mesh.strokes), BATCH):
         strokes = mesh.strokes[start : start + BATCH].astype(np.int64)
         vertices = strokes[:, 0] if of_points else strokes.reshape(-1)
@@ -271,22 +405,40 @@ def strips(screen: Viewport, positions: Array, ends: Indices) -> Strips:
 
 def _squares(screen: Viewport, positions: Array, ends: Indices) -> Strips:
     """Returns what `strips` returns for points, in a third of the time."""
-    view, half = screen.view, screen.point_size / 2
+    view = screen.view
     points = positions[ends[:, 0]]
     visible = view.depth(points) >= view.near
     if not visible.all():
         points, ends = points[visible], ends[visible]
-    low = np.full((1, 2), -half)
-    high = -low
-    if screen.on_grid:
-        centre = (_pixel(screen, points) + screen.corner) * screen.size
-        low, high = (_edge(centre + offset) - centre for offset in (low, high))
+    low, high = _extent(screen, points)
     size = _pixel_size(screen, points)
     low, high = low * size, high * size
     corners = np.empty((len(points), 4, 3))
     for number, (x, y) in enumerate(((low, low), (high, low), (high, high), (low, high))):
         corners[:, number] = points + x[:, :1] * view.axes[0] + y[:, 1:] * view.axes[1]
     return Strips(corners.reshape(-1, 3), ends, None)
+
+
+def _extent(screen: Viewport, points: Array) -> tuple[Array, Array]:
+    """Returns two corners of squares relative to their points (N, 3), the lower left and the upper right one [pixels].
+
+    Each is (N, 2), or (1, 2) where all squares are alike.
+    """
+    half = np.full((1, 2), screen.point_size / 2)
+    if not screen.on_grid:
+        return -half, half
+    centre = (_pixel(screen, points) + screen.corner) * screen.size
+    return _edge(centre - half) - centre, _edge(centre + half) - centre
+
+
+def _centred_on_grid(screen: Viewport, points: Array) -> Array:
+    """Returns the centres (N, 3) of the squares of points (N, 3), which `on_grid` moves by half a pixel at most."""
+    if not screen.on_grid:
+        return points
+    low, high = _extent(screen, points)
+    step = (low + high) / 2 * _pixel_size(screen, points)
+    moved: Array = points + step @ screen.view.axes[:2]
+    return moved
 
 
 def _edge(corner: Array) -> Array:

@@ -15,6 +15,7 @@ from glshade.assembly.instance import Instance
 from glshade.brdfs import Array, Brdf, parameter_values
 from glshade.errors import SceneError
 from glshade.lights import FALLOFFS, Falloff, Light
+from glshade.optics.spectra import Spectrum
 from glshade.textures.texture import DirectionMap, Texture
 
 
@@ -43,6 +44,22 @@ def normal_matrix(linear: Array) -> Array:
     )
     sign = math.copysign(1.0, a * cofactors[0, 0] + b * cofactors[0, 1] + c * cofactors[0, 2])
     result: Array = sign * cofactors / np.abs(cofactors).max()
+    return result
+
+
+def normal_matrices(linear: Array) -> Array:
+    """Returns the matrices (N, 3, 3) that `normal_matrix` returns for each of the matrices (N, 3, 3), to the bit."""
+    scaled = linear / np.abs(linear).max(axis=(1, 2), keepdims=True)
+    (a, b, c), (d, e, f), (g, h, i) = scaled.transpose(1, 2, 0)
+    cofactors = np.array(
+        [
+            [e * i - f * h, f * g - d * i, d * h - e * g],
+            [h * c - i * b, i * a - g * c, g * b - h * a],
+            [b * f - c * e, c * d - a * f, a * e - b * d],
+        ]
+    ).transpose(2, 0, 1)
+    sign = np.copysign(1.0, a * cofactors[:, 0, 0] + b * cofactors[:, 0, 1] + c * cofactors[:, 0, 2])
+    result: Array = sign[:, None, None] * cofactors / np.abs(cofactors).max(axis=(1, 2), keepdims=True)
     return result
 
 
@@ -114,6 +131,7 @@ def emitted(instance: Instance, exposure: float) -> NDArray[np.float32]:
     Errors: SceneError for a value that is too large for float32.
     """
     emission = instance.material.emission
+    assert not isinstance(emission, Spectrum), "an assembly has RGB colours in place of spectra"
     return _exposed(instance, emission.factor if isinstance(emission, Texture) else emission, exposure)
 
 

@@ -20,6 +20,7 @@ from glshade.batch.maker import Drawn, Maker
 from glshade.batch.record import Record
 from glshade.batch.task import Task
 from glshade.errors import GlshadeError
+from glshade.startup import shorten
 
 
 class Worker:
@@ -106,6 +107,7 @@ def main() -> None:
 
     reference: true if the float64 reference draws.
     """
+    shorten()
     arguments = json.loads(sys.argv[1])
     reference = arguments.pop("reference")
     events = os.dup(1)

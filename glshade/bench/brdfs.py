@@ -14,7 +14,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, get_args
 
-from glshade.brdfs import BRDFS, Brdf, numbers
+from glshade.brdfs import BRDFS, Brdf
 from glshade.driver.census import Operations, censuses
 from glshade.driver.clock import Spread, on_cpu
 from glshade.driver.workload import Workload
@@ -22,6 +22,7 @@ from glshade.gl.context import Backend, open_context
 from glshade.glsl.generator import model_code
 from glshade.glsl.shaders import Shaders, current, expand
 from glshade.glsl.source import Code, Source, Stage
+from glshade.glsl.uniforms import model_inputs
 from glshade.scene.models import Folders, paths
 
 # Default number of measurements of each model.
@@ -176,7 +177,7 @@ def costs(
         rows = []
         for (name, variant, brdf), count in zip(materials, counted, strict=True):
             pixel, vertex = (
-                benches[stage].nanoseconds(source(brdf, stage, files), numbers(brdf), repeat)
+                benches[stage].nanoseconds(source(brdf, stage, files), model_inputs(brdf), repeat)
                 for stage in ("fragment", "vertex")
             )
             rows.append(Cost(name, variant, pixel, vertex, count, size(brdf, files)))

@@ -4,40 +4,35 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
 import sys
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from time import perf_counter
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from glshade.bench.process import Conversation, ProgramError, timed
 from glshade.bench.works import GLSHADE, Work
-from glshade.errors import GlshadeError
 
 # Smallest number of frames in a round, for works of the kind "frame". The time of the round is the median of the frames' times.
 FRAMES = 5
 
 
-class ProgramError(GlshadeError):
-    """The exception that is raised if a program ended before it had done its work. The message has its last line of output."""
-
-
 @dataclass(frozen=True)
 class RoundTimes:
-    """The times of one round.
+    """The measurements of one round.
 
     seconds: time of the work [s]
     whole: time of the command of which the work is a part [s]; None if the work is not part of a command
+    peak: largest resident memory of the program's largest process so far [bytes]; None if it was not measured
     """
 
     seconds: float
     whole: float | None = None
+    peak: int | None = None
 
 
 class Entrant(Protocol):
@@ -49,10 +44,10 @@ class Entrant(Protocol):
     driver: str | None
 
     def round(self) -> RoundTimes:
-        """Does the work once and returns the times. Errors: ProgramError."""
+        """Does the work once and returns the measurements. Errors: ProgramError."""
 
-    def picture(self) -> NDArray[np.uint8]:
-        """Returns the last frame, (H, W, 3) uint8, row 0 at the top."""
+    def picture(self) -> NDArray[np.uint8] | None:
+        """Returns the last frame, (H, W, 3) uint8, row 0 at the top; None if the work makes no picture."""
 
     def close(self) -> None:
         """Ends the process or removes the files."""
@@ -67,54 +62,31 @@ def enter(name: str, work: Work, stage: Path, folder: Path) -> Entrant:
     folder: folder for the program's files
     Errors: ProgramError.
     """
-    kinds: dict[str, Callable[[str, Work, Path, Path], Entrant]] = {"frame": Frames, "files": Files, "cold": Cold}
+    if work.kind == "frame":
+        return Frames(name, worker(name, "serve", stage), folder)
+    kinds: dict[str, Callable[[str, Work, Path, Path], Entrant]] = {"files": Files, "cold": Cold}
     return kinds[work.kind](name, work, stage, folder)
 
 
 class Frames:
-    """A program that draws the same picture repeatedly in one process. The process times itself and answers over a pipe."""
+    """A program that draws repeatedly in one process. The process times itself; `glshade.bench.worker` has the protocol."""
 
-    def __init__(self, name: str, work: Work, stage: Path, folder: Path) -> None:
-        self._name, self._file = name, folder / "picture.npy"
-        # stderr goes to a file, because a pipe that nobody reads would fill up and block the process.
-        self._errors = tempfile.TemporaryFile("w+")  # noqa: SIM115 it stays open as long as the process runs
-        self._process = subprocess.Popen(
-            _worker(name, "serve", stage), stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=self._errors, text=True
-        )
-        self.driver: str | None = self._answer()["driver"]
-
-    def _answer(self) -> Any:
-        assert self._process.stdout is not None
-        line = self._process.stdout.readline()
-        if not line:
-            self._process.wait()
-            self._errors.seek(0)
-            fault = _fault(self._name, self._errors.read())
-            self.close()
-            raise ProgramError(fault)
-        return json.loads(line)
-
-    def _ask(self, request: int | str) -> Any:
-        assert self._process.stdin is not None
-        try:
-            self._process.stdin.write(json.dumps(request) + "\n")
-            self._process.stdin.flush()
-        except BrokenPipeError:
-            pass  # the process has ended; `_answer` raises its last message
-        return self._answer()
+    def __init__(self, name: str, command: Sequence[str], folder: Path) -> None:
+        self._file = folder / "picture.npy"
+        self._talk = Conversation(name, command)
+        self.driver: str | None = self._talk.first["driver"]
 
     def round(self) -> RoundTimes:
-        return RoundTimes(median(self._ask(FRAMES)))
+        times = self._talk.ask(FRAMES)
+        return RoundTimes(median(times), peak=self._talk.ask("peak"))
 
     def picture(self) -> NDArray[np.uint8]:
-        self._ask(str(self._file))
+        self._talk.ask(str(self._file))
         pixels: NDArray[np.uint8] = np.load(self._file)
         return pixels[..., :3]
 
     def close(self) -> None:
-        if not self._errors.closed:
-            self._process.communicate()
-            self._errors.close()
+        self._talk.close()
 
 
 class Files:
@@ -132,14 +104,14 @@ class Files:
             self._command = [*RENDER, str(stage.with_name("scene.toml")), "-f", f"1-{work.frames}", "-o", pattern]
             self._command += ["--json", *options]
         else:
-            self._command = _worker(name, "files", stage, self._folder)
+            self._command = worker(name, "files", stage, self._folder)
 
     def round(self) -> RoundTimes:
         shutil.rmtree(self._folder, ignore_errors=True)
-        whole, out = timed(self._command, self._name)
-        events = [json.loads(line) for line in out.splitlines()]
+        run = timed(self._command, self._name)
+        events = reports(run.out)
         self.driver = next((event["driver"] for event in events if event.get("driver")), None)
-        return RoundTimes(pictures_took(events), whole)
+        return RoundTimes(pictures_took(events), run.seconds, run.peak)
 
     def picture(self) -> NDArray[np.uint8]:
         return read_codes(self._folder / f"{self._frames:04d}.png")
@@ -161,11 +133,12 @@ class Cold:
         if name == GLSHADE:
             self._command = [*RENDER, str(stage.with_name("scene.toml")), "-o", str(self._file)]
         else:
-            self._command = _worker(name, "cold", stage, self._file)
+            self._command = worker(name, "cold", stage, self._file)
 
     def round(self) -> RoundTimes:
         self._file.unlink(missing_ok=True)
-        return RoundTimes(timed(self._command, self._name)[0])
+        run = timed(self._command, self._name)
+        return RoundTimes(run.seconds, peak=run.peak)
 
     def picture(self) -> NDArray[np.uint8]:
         return read_codes(self._file)
@@ -176,6 +149,14 @@ class Cold:
 
 # The command `glshade render`, run by this interpreter.
 RENDER = (sys.executable, "-m", "glshade", "render")
+
+
+def reports(out: str) -> list[dict[str, Any]]:
+    """Returns what a command has printed: a JSON object in each line. Errors: ProgramError."""
+    try:
+        return [json.loads(line) for line in out.splitlines()]
+    except ValueError:
+        raise ProgramError("the command printed something that is not JSON") from None
 
 
 def pictures_took(events: Sequence[dict[str, Any]]) -> float:
@@ -198,24 +179,6 @@ def read_codes(path: Path) -> NDArray[np.uint8]:
     return codes
 
 
-def timed(command: Sequence[str], name: str = GLSHADE) -> tuple[float, str]:
-    """Runs a command and returns its wall-clock time [s] and its stdout. Errors: ProgramError if its exit code is not 0."""
-    start = perf_counter()
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    seconds = perf_counter() - start
-    if done.returncode:
-        raise ProgramError(_fault(name, done.stderr))
-    return seconds, done.stdout
-
-
-def _worker(name: str, verb: str, *paths: Path) -> list[str]:
+def worker(name: str, verb: str, *paths: Path) -> list[str]:
     """Returns the command line of a program's process; `glshade.bench.worker` explains the verbs and paths."""
     return [sys.executable, "-m", "glshade.bench.worker", name, verb, *map(str, paths)]
-
-
-def _fault(name: str, output: str) -> str:
-    """Returns a message with the last line of a program's output that mentions an error; if none does, with the last line."""
-    lines = [line.strip() for line in output.splitlines() if line.strip()]
-    errors = [line for line in lines if "error" in line.lower()]
-    last = (errors or lines or ["it printed nothing"])[-1]
-    return f"{name} ended early: {last[:200]}"

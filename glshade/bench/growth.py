@@ -19,8 +19,8 @@ from glshade.gl.renderer import Renderer
 from glshade.mesh.primitives import icosphere
 from glshade.scene.scene import Scene
 
-# Largest exponent that counts as near linear: with it, twice as many contents take 2.2 times as long.
-NEAR_LINEAR = 1.15
+# Largest exponent that counts as near linear: with it, twice as many contents take 2.14 times as long.
+NEAR_LINEAR = 1.1
 # Largest time that one more object may add to a frame [s].
 AN_OBJECT = 30e-6
 # Default width and height of the pictures [pixels].

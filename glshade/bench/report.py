@@ -11,10 +11,10 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from glshade.bench.contest import ContestRow
+from glshade.bench.contest import ContestRow, ContestTable
 from glshade.bench.growth import AN_OBJECT, NEAR_LINEAR, Growth
 from glshade.bench.jobs import TARGET, Jobs
-from glshade.bench.works import GLSHADE, WORKS
+from glshade.bench.works import BY_HAND, DOOR, GLSHADE, WORKS
 from glshade.driver.clock import Spread
 from glshade.version import __version__
 
@@ -29,41 +29,42 @@ Table = tuple[str, list[tuple[str, ...]]]
 class BenchReport:
     """The results of one run.
 
-    repeat: number of rounds that were counted
+    repeat: number of rounds that were counted, at most
     small: True if the works were reduced, to see that they work
-    contests: name of a work -> results of the programs
+    contests: name of a work -> its table
     growths: the series that were measured
     jobs: the frame rates for each number of jobs; None if they were not measured
     """
 
     repeat: int
     small: bool
-    contests: dict[str, list[ContestRow]] = field(default_factory=dict)
+    contests: dict[str, ContestTable] = field(default_factory=dict)
     growths: list[Growth] = field(default_factory=list)
     jobs: Jobs | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Returns the report as JSON types."""
-        works = {
-            name: {"what": WORKS[name].what, "limit_seconds": WORKS[name].limit, "rows": [row.as_dict() for row in rows]}
-            for name, rows in self.contests.items()
-        }
         return {
             "schema": SCHEMA,
             "date": date.today().isoformat(),
             "machine": machine(),
-            "versions": versions([row.program for rows in self.contests.values() for row in rows]),
+            "versions": versions([row.program for row in self._rows()]),
             "repeat": self.repeat,
             "small": self.small,
-            "works": works,
+            "works": {name: table.as_dict() for name, table in self.contests.items()},
             "growth": [growth.as_dict() for growth in self.growths],
             "jobs": self.jobs and self.jobs.as_dict(),
         }
 
+    @property
+    def failed(self) -> list[str]:
+        """The names of the works at which glshade itself has no result."""
+        return [name for name, table in self.contests.items() if table.rows[0].fault is not None]
+
     def tables(self) -> Iterator[Table]:
         """Yields a table for each work that was measured, and one each for growth and jobs if these were measured."""
-        for name, rows in self.contests.items():
-            yield f"{name}: {WORKS[name].what}", list(_contest(name, rows))
+        for name, table in self.contests.items():
+            yield f"{name}: {table.what}", list(_contest(table))
         if self.growths:
             yield "growth of the time of a frame with what is in it", list(_growths(self.growths))
         if self.jobs:
@@ -83,7 +84,7 @@ class BenchReport:
         return lines
 
     def _rows(self) -> list[ContestRow]:
-        return [row for rows in self.contests.values() for row in rows]
+        return [row for table in self.contests.values() for row in table.rows]
 
 
 def machine() -> dict[str, Any]:
@@ -102,9 +103,12 @@ def _cpu() -> str:
 
 
 def versions(programs: Sequence[str]) -> dict[str, str]:
-    """Returns the version of glshade and of each program's library: name -> version, "?" if unknown."""
+    """Returns the version of glshade and of each program's library: name -> version, "?" if unknown.
+
+    The first word of a program's name is its library. "python", the bare interpreter, is left out.
+    """
     numbers = {GLSHADE: __version__}
-    for name in programs:
+    for name in dict.fromkeys(program.split()[0] for program in programs if program not in (DOOR, "python")):
         try:
             numbers.setdefault(name, version(name))
         except PackageNotFoundError:
@@ -121,24 +125,42 @@ def markdown(report: BenchReport) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def _contest(name: str, rows: Sequence[ContestRow]) -> Iterator[tuple[str, ...]]:
-    """Yields the rows of a work's table. Times are in seconds if the work is of the kind "files", otherwise in milliseconds."""
-    unit, scale = ("s", 1.0) if WORKS[name].kind == "files" else ("ms", 1e3)
-    commands = any(row.whole for row in rows)
+def _contest(table: ContestTable) -> Iterator[tuple[str, ...]]:
+    """Yields the rows of a work's table."""
+    scale = 1.0 if table.unit == "s" else 1e3
+    commands = any(row.whole for row in table.rows)
     whole_heads = ("whole command",) if commands else ()
-    yield ("program", unit, "range", *whole_heads, "ratio", "range", "target", "picture")
-    for row in rows:
-        label = f"{row.program} by hand" if row.program == "moderngl" else row.program
+    yield ("program", table.unit, "range", *whole_heads, "ratio", "range", "target", "MB", "picture")
+    for row in table.rows:
+        label = row.program.replace(BY_HAND, f"{BY_HAND} by hand", 1) if row.program.startswith(BY_HAND) else row.program
         if row.fault is not None:
-            yield (label, *["-"] * (6 if commands else 5), row.fault)
+            yield (label, *["-"] * (7 if commands else 6), row.fault)
             continue
-        whole = _figures(row.whole, 1.0)[0] + " s" if row.whole else "-"
-        limit = WORKS[name].limit
-        if row.program == GLSHADE and limit is not None and row.whole is not None:
-            whole += f" (<= {limit:g} s: {_word(row.whole.median <= limit)})"
+        whole = (_figures(row.whole, 1.0)[0] + " s" if row.whole else "-",) if commands else ()
         aim = "" if row.target is None else f"<= {row.target:.2f}: {_word(row.met)}"
-        picture = "" if row.program == GLSHADE else "the same" if row.same else f"another ({row.codes} codes)"
-        yield (label, *_figures(row.seconds, scale), *((whole,) if commands else ()), *_figures(row.ratio, 1.0), aim, picture)
+        memory = "" if row.peak is None else f"{row.peak / 1e6:.0f}"
+        if row.program == GLSHADE:
+            aim = _limit(table)
+            if table.memory is not None and row.peak is not None:
+                memory += f" (<= {table.memory / 1e6:.0f}: {_word(row.peak <= table.memory)})"
+        yield (label, *_figures(row.seconds, scale), *whole, *_figures(row.ratio, 1.0), aim, memory, _picture(row))
+
+
+def _limit(table: ContestTable) -> str:
+    """Returns the limit of glshade's time and whether it is kept; empty if there is no limit."""
+    limited = table.limited
+    if table.limit is None or limited is None:
+        return ""
+    scale = 1.0 if table.unit == "s" else 1e3
+    over = "" if table.over is None else f" above {table.over}, {_short(limited * scale)} {table.unit}"
+    return f"<= {table.limit * scale:g} {table.unit}{over}: {_word(limited <= table.limit)}"
+
+
+def _picture(row: ContestRow) -> str:
+    """Returns how a program's picture compares with glshade's."""
+    if row.program in (GLSHADE, DOOR) or row.codes is None:
+        return ""
+    return "the same" if row.same else f"another ({row.codes} codes)"
 
 
 def _growths(growths: Sequence[Growth]) -> Iterator[tuple[str, ...]]:

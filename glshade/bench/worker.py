@@ -59,18 +59,35 @@ def draws(draw: Callable[[], Any], count: int) -> list[float]:
     return times[1:]
 
 
+def own_peak() -> int:
+    """Returns the largest resident memory that this process has had [bytes].
+
+    Linux's VmHWM begins anew with each program that a process becomes; getrusage counts what the process had before, too.
+    """
+    try:
+        lines = Path("/proc/self/status").read_text(encoding="ascii").splitlines()
+    except OSError:
+        import resource
+
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    # The line reads "VmHWM:  123456 kB".
+    return next(int(line.split()[1]) * 1024 for line in lines if line.startswith("VmHWM:"))
+
+
 def serve(drawer: Any, answer: Any) -> None:
     """Answers each line of stdin, one JSON value a line.
 
-    A number asks for that many frames; the answer is the time of each [s]. A string is the path of an .npy file, to which the
-    picture is written; the answer is the path.
+    A number asks for that many frames; the answer is the time of each [s]. "peak" asks for the largest memory of the process
+    so far [bytes]. Another string is the path of an .npy file, to which the picture is written; the answer is the path.
     """
     import numpy as np
 
     answer({"driver": drawer.driver})
     for line in sys.stdin:
         request = json.loads(line)
-        if isinstance(request, str):
+        if request == "peak":
+            answer(own_peak())
+        elif isinstance(request, str):
             np.save(request, drawer.frame(EYE))
             answer(request)
         else:

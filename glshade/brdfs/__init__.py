@@ -5,6 +5,7 @@ computes f cos in float64: the BRDF f times max(n.l, 0) [1/sr], and 0 where n.l 
 direction to the light, and v the direction to the viewer. The shape (...) stands for any leading shape.
 """
 
+import warnings
 from collections.abc import Iterable, Mapping
 from copy import deepcopy
 from dataclasses import dataclass
@@ -15,14 +16,26 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Discriminator, Field, GetJsonSchemaHandler, Tag, ValidationInfo, field_validator
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    Field,
+    GetJsonSchemaHandler,
+    Tag,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import CoreSchema
 
 from glshade.arrays import rounded
-from glshade.document import Document, Finite, Triple, fault
-from glshade.errors import figure
+from glshade.document import Document, Finite, Shorthand, Triple, fault
+from glshade.errors import AssetWarning, figure
 from glshade.found import Found
+from glshade.optics.reradiation import Reradiation
+from glshade.optics.spectra import Spectrum, is_spectrum
 from glshade.textures.texture import BumpMap, DirectionMap, NormalMap, OcclusionMap, Picture, Texture
+from glshade.textures.volume import Volume
 
 Array = NDArray[np.float64]
 
@@ -31,10 +44,29 @@ def _branch(value: Any) -> str:
     return "<texture-table>" if isinstance(value, Mapping | Picture) else "<value>"
 
 
-# The types of parameters. A colour is three numbers (one number stands for three equal ones) or a texture; a scalar is one
-# number or a texture.
-Colour = Annotated[Annotated[Triple, Tag("<value>")] | Annotated[Texture, Tag("<texture-table>")], Discriminator(_branch)]
-Scalar = Annotated[Annotated[Finite, Tag("<value>")] | Annotated[Texture, Tag("<texture-table>")], Discriminator(_branch)]
+def _branch_of_colour(value: Any) -> str:
+    return "<spectrum-table>" if is_spectrum(value) else _branch(value)
+
+
+def _no_spectrum(value: Any) -> Any:
+    if is_spectrum(value):
+        raise fault("is one number, so that it cannot be a spectrum")
+    return value
+
+
+# The types of parameters. A colour is three numbers (one number stands for three equal ones), a spectrum or a texture; a scalar
+# is one number or a texture.
+Colour = Annotated[
+    Annotated[Triple, Tag("<value>")]
+    | Annotated[Spectrum, Tag("<spectrum-table>")]
+    | Annotated[Texture, Tag("<texture-table>")],
+    Discriminator(_branch_of_colour),
+]
+Scalar = Annotated[
+    Annotated[Finite, Tag("<value>")] | Annotated[Texture, Tag("<texture-table>")],
+    Discriminator(_branch),
+    BeforeValidator(_no_spectrum),
+]
 # An angle, or a texture that holds a direction in each texel.
 Turn = Annotated[Annotated[Finite, Tag("<value>")] | Annotated[DirectionMap, Tag("<texture-table>")], Discriminator(_branch)]
 
@@ -50,6 +82,7 @@ class Parameter:
     unit: the unit; "1" for a number without one.
     same_as: the name of another parameter, whose value is the default.
     base: whether it is the surface's own colour. Vertex colours multiply that one, and its texture holds alpha.
+    held: whether the ends of its spectrum's table hold beyond them, as those of a refractive index; otherwise it is 0 there.
     """
 
     description: str
@@ -59,6 +92,7 @@ class Parameter:
     unit: str = "1"
     same_as: str | None = None
     base: bool = False
+    held: bool = False
 
 
 def parameter(default: Any, declared: Parameter) -> Any:
@@ -133,6 +167,9 @@ class Brdf(Document):
         0.0, description="anisotropic models: the angle by which the tangent is turned from u toward v [degrees]"
     )
     sides: Literal["auto", "front", "both"] = Field("auto", description="the sides that are drawn; an object can override it")
+    reradiation: Annotated[Reradiation, Shorthand("file")] | None = Field(
+        None, description="fluorescence: a file of the light that the surface gives off at other wavelengths; docs/spectral.md"
+    )
 
     # The publication: authors, year and equations.
     source: ClassVar[str] = ""
@@ -150,6 +187,12 @@ class Brdf(Document):
     has_reference: ClassVar[bool] = True
     # Whether the model's value can depend on the tangent directions.
     anisotropic: ClassVar[bool] = False
+    # The colours in which f cos and the ambient reflectance are linear together, channel by channel, while all else is equal at
+    # all wavelengths. Spectra of these colours are integrated before drawing; those of others are drawn in bands.
+    linear: ClassVar[tuple[str, ...]] = ()
+    # The tables that the model reads: name -> the key that names the table's file. `brdf_cos` gets the table NAME as m.NAME,
+    # and the model's GLSL file declares it as `uniform sampler3D u_NAME;`.
+    tables: ClassVar[Mapping[str, str]] = {}
 
     @classmethod
     def __pydantic_init_subclass__(cls, **_: Any) -> None:
@@ -187,6 +230,39 @@ class Brdf(Document):
         """Returns the name that is chosen for each option."""
         return {name: getattr(self, name) for name in self.choices()}
 
+    def linear_colours(self) -> tuple[str, ...]:
+        """Returns the colours of `linear`, without those in which this material is not linear."""
+        return self.linear
+
+    @property
+    def mixes_channels(self) -> bool:
+        """Whether a channel of the material's light depends on the other channels of its colours."""
+        return False
+
+    @property
+    def is_handed(self) -> bool:
+        """Whether the surface reflects light differently when light, viewer and normal are all mirrored."""
+        return False
+
+    def table(self, name: str) -> Volume:
+        """Returns a table of `tables`. Errors: AssetError for a file that cannot be read."""
+        raise NotImplementedError
+
+    def volumes(self) -> dict[str, Volume]:
+        """Returns all tables by name. Errors: AssetError for a file that cannot be read."""
+        return {name: self.table(name) for name in self.tables}
+
+    def notes(self) -> tuple[str, ...]:
+        """Returns sentences about the material's tables, for `glshade explain`. Errors: AssetError."""
+        return ()
+
+    def data(self) -> dict[str, Any]:
+        """Returns all that `brdf_cos` reads beside parameters and options, by name: the tables, and what a model adds to them.
+
+        Errors: AssetError for a file that cannot be read.
+        """
+        return {**self.volumes()}
+
     def half_angle(self) -> "Brdf":
         """Returns the half-angle variant of a model that uses the mirror direction: an approximation (lecture slide 20). Other
         models return themselves."""
@@ -205,6 +281,15 @@ class Brdf(Document):
         """Returns the name of the parameter that is the surface's own colour; None if the model has no such parameter."""
         return next((name for name, declared in cls.parameters().items() if declared.base), None)
 
+    def in_rgb(self) -> "Brdf":
+        """Returns the material with its colours under D65 in place of spectra, and without reradiation. Errors: AssetError."""
+        changes: dict[str, Any] = {"reradiation": None}
+        for name in (*self.parameters(), "emission"):
+            value, declared = getattr(self, name), self.declared(name)
+            if isinstance(value, Spectrum):
+                changes[name] = value.colour(lit=declared is not EMISSION, held=declared is not None and declared.held)
+        return self.model_copy(update=changes)
+
     def without_base(self) -> "Brdf":
         """Returns the material with a black base colour: its specular part, if only the diffuse lobe uses that colour."""
         name = self.base()
@@ -218,6 +303,8 @@ class Brdf(Document):
     @property
     def emits(self) -> bool:
         """Whether the surface may emit light."""
+        if isinstance(self.emission, Spectrum):
+            return any(self.emission.colour(lit=False))
         return any((*self.emission.factor, *self.emission.add) if isinstance(self.emission, Texture) else self.emission)
 
     def slots(self) -> dict[str, Slot]:
@@ -283,12 +370,39 @@ class Brdf(Document):
             raise fault(f'a colour reads three channels, so channel = "{value.channel}" is not allowed')
         if declared is None or value is None or isinstance(value, Texture):
             return value
+        if isinstance(value, Spectrum):
+            return value if declared is EMISSION else _checked(value, declared)
         numbers = value if isinstance(value, tuple) else (value,)
         if min(numbers) < declared.low:
             raise fault(f"must be at least {declared.low:g}, not {figure(min(numbers))}")
         if declared.high is not None and max(numbers) > declared.high:
             raise fault(f"must be at most {declared.high:g}, not {figure(max(numbers))}")
         return value
+
+    @model_validator(mode="after")
+    def _conserves(self) -> "Brdf":
+        """Refuses a surface that gives off more light by reradiation and reflection together than arrives."""
+        if self.reradiation is None:
+            return self
+        name = self.base()
+        own = getattr(self, name) if name else None
+        excess = self.reradiation.excess(_reflectance(own))
+        if excess:
+            wavelength, ratio = excess
+            raise fault(
+                f"reradiation: of light of {wavelength:g} nm, {figure(round(ratio, 6))} times its energy is reflected and "
+                "given off, and at most 1 can be"
+            )
+        shorter = self.reradiation.shorter()
+        if shorter:
+            excited, emitted = shorter
+            warnings.warn(
+                f"{self.reradiation.file}: light of {excited:g} nm is given off at {emitted:g} nm, which is shorter: real dyes "
+                "give off longer waves than they take in; are rows and columns exchanged?",
+                AssetWarning,
+                stacklevel=2,
+            )
+        return self
 
     def canonical(self, ambient: bool) -> "Brdf":
         """Returns the simplest material with the same value; lobes of weight zero are left out.
@@ -320,11 +434,38 @@ class _Asked:
         self.names: set[str] = set()
         self._model, self._chosen = model, chosen
 
-    def __getattr__(self, name: str) -> Array | str:
+    def __getattr__(self, name: str) -> Array | str | Volume | float:
         if name in self._chosen:
             return self._chosen[name]
+        if name in self._model.tables:
+            return Volume.constant(0.0)
+        if name not in self._model.parameters():
+            return 1.0
         self.names.add(name)
         return np.full((1, 3) if self._model.is_colour(name) else (1,), 0.5)
+
+
+def _reflectance(colour: Any) -> Array:
+    """Returns the reflectance by wavelength (531,) of a surface's own colour; 0 for a texture and for None."""
+    from glshade.optics.upsampling import spectrum_of  # here, because few scenes need it
+
+    if isinstance(colour, Spectrum):
+        return colour.values()
+    return spectrum_of(BLACK if colour is None or isinstance(colour, Texture) else colour)
+
+
+def _checked(value: Spectrum, declared: Parameter) -> Spectrum:
+    """Returns the spectrum of a parameter; refuses one that is a light or that leaves the parameter's range."""
+    if value.is_light:
+        raise fault(f"{value.name} is the spectrum of a light, not of a surface")
+    wavelengths, values = value.rows
+    values = value.scale * values
+    low, high = int(np.argmin(values)), int(np.argmax(values))
+    if values[low] < declared.low:
+        raise fault(f"must be at least {declared.low:g}, not {figure(values[low])} (at {wavelengths[low]:g} nm)")
+    if declared.high is not None and values[high] > declared.high:
+        raise fault(f"must be at most {declared.high:g}, not {figure(values[high])} (at {wavelengths[high]:g} nm)")
+    return value
 
 
 def _bound(schema: dict[str, Any], declared: Parameter) -> None:
@@ -356,16 +497,23 @@ def numbers(brdf: Brdf) -> dict[str, NDArray[np.float32]]:
 
 
 def widened(brdf: Brdf) -> SimpleNamespace:
-    """Returns the material as `Brdf.brdf_cos` takes it: the float32 values, widened to float64, and the options.
+    """Returns the material as `Brdf.brdf_cos` takes it: the float32 values, widened to float64, the options and the tables.
 
-    Errors: ValueError for a texture.
+    Errors: ValueError for a texture; AssetError for a table whose file cannot be read.
     """
-    return SimpleNamespace(**{name: value.astype(np.float64) for name, value in numbers(brdf).items()}, **brdf.chosen())
+    values = {name: value.astype(np.float64) for name, value in numbers(brdf).items()}
+    return SimpleNamespace(**values, **brdf.chosen(), **brdf.data())
 
 
 def parameter_values(material: Brdf) -> dict[str, Any]:
-    """Returns the values of the parameters by name. A parameter that was left out has the value of its `same_as`."""
-    values = {name: (getattr(material, name), declared.same_as) for name, declared in material.parameters().items()}
-    return {
-        name: getattr(material, same_as) if value is None and same_as else value for name, (value, same_as) in values.items()
-    }
+    """Returns the values of the parameters by name.
+
+    A parameter that was left out has the value of its `same_as`, and one with a spectrum has its colour under D65.
+    """
+    values = {}
+    for name, declared in material.parameters().items():
+        value = getattr(material, name)
+        if value is None and declared.same_as:
+            value = getattr(material, declared.same_as)
+        values[name] = value.colour(lit=True, held=declared.held) if isinstance(value, Spectrum) else value
+    return values

@@ -18,6 +18,7 @@ class Ambient(Brdf):
         {"ka": 6},
         {"ka": 10},
     )
+    linear: ClassVar[tuple[str, ...]] = ("ka",)
 
     brdf: Literal["ambient"] = "ambient"
     ka: Colour = parameter((0.8, 0.8, 0.8), Parameter("ambient reflectance", base=True))

@@ -27,6 +27,7 @@ class AshikhminShirley(Brdf):
         {"pu": 1000, "pv": 1000},
         {"pu": 10, "pv": 1000},
     )
+    linear: ClassVar[tuple[str, ...]] = ("kd",)
 
     brdf: Literal["ashikhmin_shirley"] = "ashikhmin_shirley"
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("diffuse reflectance", high=1.0, base=True))

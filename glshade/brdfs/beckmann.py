@@ -25,6 +25,7 @@ class Beckmann(Brdf):
     """
 
     source: ClassVar[str] = "Cook and Torrance 1982; Walter et al. 2007, eqs. 20, 25; Heitz 2014, eq. 99"
+    linear: ClassVar[tuple[str, ...]] = ("kd",)
 
     brdf: Literal["beckmann"] = "beckmann"
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("diffuse reflectance", high=1.0, base=True))

@@ -22,6 +22,7 @@ class BlinnPhong(Brdf):
         "energy": "the lobe reflects more than ks where p is below 5.4: 1.72 ks at p = 1, 2 ks at p = 0",
     }
     shares: ClassVar[tuple[str, ...]] = ("kd", "ks")
+    linear: ClassVar[tuple[str, ...]] = ("kd", "ks", "ka")
 
     brdf: Literal["blinn_phong"] = "blinn_phong"
     kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance", base=True))

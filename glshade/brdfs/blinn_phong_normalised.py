@@ -22,6 +22,7 @@ class BlinnPhongNormalised(Brdf):
 
     source: ClassVar[str] = "Blinn 1977; normalised after Giesen 2009"
     shares: ClassVar[tuple[str, ...]] = ("kd", "ks")
+    linear: ClassVar[tuple[str, ...]] = ("kd", "ks")
 
     brdf: Literal["blinn_phong_normalised"] = "blinn_phong_normalised"
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("diffuse reflectance", base=True))

@@ -21,6 +21,7 @@ class Burley(Brdf):
     breaks: ClassVar[Mapping[Law, str]] = {
         "energy": "it is a fit by eye, which reflects up to 1.56 times the light at grazing angles (roughness 1, kd 1)"
     }
+    linear: ClassVar[tuple[str, ...]] = ("kd",)
 
     brdf: Literal["burley"] = "burley"
     kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance", high=1.0, base=True))

@@ -35,6 +35,7 @@ class Ggx(Brdf):
         {"metallic": 1, "roughness": 0.3},
         {"metallic": 1, "roughness": 0.5, "anisotropy": 0.9},
     )
+    linear: ClassVar[tuple[str, ...]] = ("kd",)
 
     brdf: Literal["ggx"] = "ggx"
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("base colour", high=1.0, base=True))
@@ -70,6 +71,10 @@ class Ggx(Brdf):
         dark = self.lobes == "specular" or self.metallic == 1 or self.kd == (0.0, 0.0, 0.0)
         diffuse = "none" if dark else "beside_schlick"
         return {"ggx": ggx_slot(self.anisotropy), "diffuse": Slot((f"microfacet/diffuse_{diffuse}.glsl",))}
+
+    def linear_colours(self) -> tuple[str, ...]:
+        # Between a dielectric and a metal, kd is part of the Fresnel term that dims the diffuse lobe of kd.
+        return self.linear if self.metallic in (0.0, 1.0) or self.lobes == "specular" else ()
 
     def asked(self, by: Literal["light", "ambient"]) -> frozenset[str]:
         return super().asked(by) - ({"anisotropy"} if not self.needs_tangents else set())

@@ -35,6 +35,7 @@ class Lafortune(Brdf):
         {"cx_1": -1, "cz_1": 0.7, "exponent_1": 10},
         {"cx_1": 1, "exponent_1": 10},
     )
+    linear: ClassVar[tuple[str, ...]] = ("kd", "ks_1", "ks_2", "ks_3")
 
     brdf: Literal["lafortune"] = "lafortune"
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("diffuse reflectance", base=True))

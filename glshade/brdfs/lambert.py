@@ -17,6 +17,7 @@ class Lambert(Brdf):
         {"kd": 0.6},
         {"kd": 1.0},
     )
+    linear: ClassVar[tuple[str, ...]] = ("kd",)
 
     brdf: Literal["lambert"] = "lambert"
     kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance (albedo)", base=True))

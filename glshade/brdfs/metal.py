@@ -32,9 +32,12 @@ class Metal(Brdf):
     brdf: Literal["metal"] = "metal"
     # The defaults are those of evaporated gold: Olmon et al. 2012.
     eta: Colour = parameter(
-        (0.1239, 0.3805, 1.541), Parameter("index of refraction; default: gold", low=0.01, high=100.0, usual=(0.1, 4.0))
+        (0.1239, 0.3805, 1.541),
+        Parameter("index of refraction; default: gold", low=0.01, high=100.0, usual=(0.1, 4.0), held=True),
     )
-    k: Colour = parameter((4.834, 2.196, 1.676), Parameter("extinction; default: gold", high=100.0, usual=(1.0, 8.0)))
+    k: Colour = parameter(
+        (4.834, 2.196, 1.676), Parameter("extinction; default: gold", high=100.0, usual=(1.0, 8.0), held=True)
+    )
     roughness: Scalar = parameter(
         0.3, Parameter("square root of alpha, the width of the lobe; below 0.01 it counts as 0.01", high=1.0, usual=(0.1, 1.0))
     )

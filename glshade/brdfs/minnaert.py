@@ -22,6 +22,7 @@ class Minnaert(Brdf):
     breaks: ClassVar[dict[Law, str]] = {
         "energy": "with k below 1 the albedo kd (n.v)^(k - 1) grows without bound towards grazing angles"
     }
+    linear: ClassVar[tuple[str, ...]] = ("kd",)
 
     brdf: Literal["minnaert"] = "minnaert"
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("diffuse reflectance: the albedo at normal incidence", base=True))

@@ -23,6 +23,7 @@ class OrenNayarQualitative(Brdf):
     breaks: ClassVar[Mapping[Law, str]] = {
         "energy": "the fit reflects up to 1.016 times the light at grazing angles (sigma 0.2, kd 1)"
     }
+    linear: ClassVar[tuple[str, ...]] = ("kd",)
 
     brdf: Literal["oren_nayar_qualitative"] = "oren_nayar_qualitative"
     kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance of a facet", high=1.0, base=True))

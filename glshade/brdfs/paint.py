@@ -34,6 +34,7 @@ class Paint(Brdf):
         {"flakes": 0.8, "flake_roughness": 0.5},
         {"flakes": 0.8, "coat": 0},
     )
+    linear: ClassVar[tuple[str, ...]] = ("kd", "flake_colour")
 
     brdf: Literal["paint"] = "paint"
     kd: Colour = parameter((0.5, 0.05, 0.05), Parameter("diffuse reflectance of the pigment", high=1.0, base=True))

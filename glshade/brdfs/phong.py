@@ -23,6 +23,7 @@ class Phong(Brdf):
         "energy": "the lobe reflects 2 ks/(p + 1) at normal incidence, which is more than ks where p is below 1",
     }
     shares: ClassVar[tuple[str, ...]] = ("kd", "ks")
+    linear: ClassVar[tuple[str, ...]] = ("kd", "ks", "ka")
 
     brdf: Literal["phong"] = "phong"
     kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("diffuse reflectance", base=True))

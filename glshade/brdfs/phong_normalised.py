@@ -19,6 +19,7 @@ class PhongNormalised(Brdf):
 
     source: ClassVar[str] = "Lafortune and Willems 1994; Lewis 1993"
     shares: ClassVar[tuple[str, ...]] = ("kd", "ks")
+    linear: ClassVar[tuple[str, ...]] = ("kd", "ks")
 
     brdf: Literal["phong_normalised"] = "phong_normalised"
     kd: Colour = parameter((0.5, 0.5, 0.5), Parameter("diffuse reflectance", base=True))

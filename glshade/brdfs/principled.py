@@ -35,6 +35,7 @@ class Principled(Brdf):
         {"metallic": 1, "roughness": 0.5, "anisotropy": 0.9},
         {"roughness": 0.7, "clearcoat": 1},
     )
+    linear: ClassVar[tuple[str, ...]] = ("kd",)
 
     brdf: Literal["principled"] = "principled"
     kd: Colour = parameter((0.8, 0.8, 0.8), Parameter("base colour", high=1.0, base=True))
@@ -126,6 +127,14 @@ class Principled(Brdf):
         body = "".join(f"    {line}\n" for line in [*lines, "return c;"])
         text = f"\nvec3 principled_cos({arguments}) {{\n{body}}}\n"
         return {"lobes": Slot(tuple(f"lobe/{name}.glsl" for name in files), text)}
+
+    def linear_colours(self) -> tuple[str, ...]:
+        return () if self.mixes_channels else self.linear
+
+    @property
+    def mixes_channels(self) -> bool:
+        # The hue of a tint is the base colour divided by its luminance.
+        return bool(self._parts() & {"sheen_tint", "specular_tint"})
 
     def asked(self, by: Literal["light", "ambient"]) -> frozenset[str]:
         parts = self._parts()

@@ -29,6 +29,7 @@ class RetroGgx(Brdf):
         {"roughness": 0.8},
         {"roughness": 1.0},
     )
+    linear: ClassVar[tuple[str, ...]] = ("kd",)
 
     brdf: Literal["retro_ggx"] = "retro_ggx"
     kd: Colour = parameter((0.3, 0.3, 0.3), Parameter("diffuse reflectance", high=1.0, base=True))

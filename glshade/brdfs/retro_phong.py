@@ -24,6 +24,7 @@ class RetroPhong(Brdf):
         {"exponent": 16},
         {"exponent": 64},
     )
+    linear: ClassVar[tuple[str, ...]] = ("kd", "ks")
 
     brdf: Literal["retro_phong"] = "retro_phong"
     kd: Colour = parameter((0.3, 0.3, 0.3), Parameter("diffuse reflectance", base=True))

@@ -34,6 +34,7 @@ class Strauss(Brdf):
         {"smoothness": 0.3, "metalness": 1},
         {"smoothness": 0.8, "metalness": 1},
     )
+    linear: ClassVar[tuple[str, ...]] = ("kd",)
 
     brdf: Literal["strauss"] = "strauss"
     kd: Colour = parameter(

@@ -26,6 +26,7 @@ class Gaussian(Brdf):
         {"alpha_x": 0.4},
         {"alpha_x": 0.4, "alpha_y": 0.1},
     )
+    linear: ClassVar[tuple[str, ...]] = ("kd", "ks")
 
     kd: Colour = parameter((0.4, 0.4, 0.4), Parameter("diffuse reflectance", base=True))
     ks: Colour = parameter((0.2, 0.2, 0.2), Parameter("specular reflectance"))

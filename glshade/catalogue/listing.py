@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any, get_args
 
 from glshade.brdfs import BRDFS, Brdf, Law
+from glshade.document import Document
 from glshade.lights import LIGHTS
 from glshade.presets import PRESETS
 
@@ -25,6 +26,7 @@ def brdf(name: str) -> dict[str, Any]:
     parameters: a list of dictionaries with the keys name, type (colour or number), default (None for an optional parameter),
         low, high, usual, unit, description, same_as and base.
     options: a list of dictionaries with the keys name, default, choices and description.
+    keys: a list of dictionaries for the model's other keys of the scene file, as for `light`.
     laws: law -> `promised` and, if the model breaks the law, the reason.
     limits: a list of dictionaries with the keys says, one, other and within.
     reference: false for a model that has only a GLSL file, so that nothing is known of its laws and limits.
@@ -54,6 +56,7 @@ def brdf(name: str) -> dict[str, Any]:
             }
             for key in model.choices()
         ],
+        "keys": _keys(model, {*Brdf.model_fields, *model.parameters(), *model.choices()}),
         "laws": {law: {"promised": law not in model.breaks, "reason": model.breaks.get(law)} for law in LAWS},
         "shares": list(model.shares),
         "isotropic_where": dict(model.isotropic_where),
@@ -77,25 +80,31 @@ def light(name: str) -> dict[str, Any]:
     """
     model = LIGHTS[name]
     falloff = model.model_fields.get("falloff")
-    schema = model.model_json_schema()
     return {
         "name": name,
         **_described(model),
         "omnidirectional": model.omnidirectional,
         "falloffs": list(get_args(falloff.annotation)) if falloff else [],
-        "keys": [
-            {
-                "name": key,
-                "default": None if field.is_required() else _plain(field.default),
-                "required": field.is_required(),
-                "takes": _takes(schema["properties"][key]),
-                "description": field.description or "",
-            }
-            for key, field in model.model_fields.items()
-            if key != "type"
-        ],
+        "keys": _keys(model, {"type"}),
         "uniforms": model.fields(),
     }
+
+
+def _keys(model: type[Document], without: set[str]) -> list[dict[str, Any]]:
+    """Returns a dictionary for each key of a table of the scene file. without: the keys that are left out."""
+    fields = {key: field for key, field in model.model_fields.items() if key not in without}
+    # Most models have no keys of this kind, and making a schema takes time.
+    schema = model.model_json_schema() if fields else {}
+    return [
+        {
+            "name": key,
+            "default": None if field.is_required() else _plain(field.default),
+            "required": field.is_required(),
+            "takes": _takes(schema["properties"][key]),
+            "description": field.description or "",
+        }
+        for key, field in fields.items()
+    ]
 
 
 def preset(name: str) -> dict[str, Any]:
@@ -165,7 +174,8 @@ def _takes(schema: Mapping[str, Any]) -> str:
         return f"{schema['maxItems']} {_takes(items)}s" if "maxItems" in schema else f"list of {_takes(items)}s"
     signs = {"minimum": ">=", "exclusiveMinimum": ">", "maximum": "<=", "exclusiveMaximum": "<"}
     bounds = [f"{sign} {schema[key]:g}" for key, sign in signs.items() if key in schema]
-    return ", ".join([str(schema.get("type", "table")), *bounds])
+    kind = "path" if schema.get("format") == "path" else schema.get("type", "table")
+    return ", ".join([str(kind), *bounds])
 
 
 def _plain(value: Any) -> Any:

@@ -15,10 +15,8 @@ from typing import NoReturn
 import click
 
 from glshade.errors import GlshadeError, printable
+from glshade.startup import shorten
 from glshade.version import __version__
-
-# Without this, pydantic reads the metadata of every installed package to look for plug-ins, which takes 20 to 50 ms.
-os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 COMMANDS = tuple(sorted(path.stem for path in Path(__file__).parent.glob("*.py") if not path.stem.startswith("_")))
 # Exit code after Ctrl-C: 128 plus the number of SIGINT, as in shells.
@@ -88,6 +86,7 @@ def main() -> None:
     The process ends without the shutdown of interpreter and driver, which would take 0.1 s. The operating system frees the
     memory faster.
     """
+    shorten()
     open_streams()
     try:
         run()

@@ -43,7 +43,7 @@ def command() -> None:
 @click.option(
     "--repeat",
     type=click.IntRange(1, 1000),
-    default=7,
+    default=5,
     show_default=True,
     help="Number of rounds; each program runs once in each.",
 )
@@ -61,16 +61,13 @@ def work(
     The other programs are one written by hand with moderngl, and those of pyrender, Mitsuba, VTK and Panda3D that are
     installed (`pip install 'glshade[peers]'`). They run in turn, each in a process of its own; docs/benchmarks.md explains how.
     """
-    import json
-
-    from glshade.bench.contest import run_contest
+    from glshade.bench.contest import measure_work
     from glshade.bench.growth import SERIES, measure_growth
     from glshade.bench.jobs import measure_jobs
     from glshade.bench.peers import installed
-    from glshade.bench.report import BenchReport, markdown
+    from glshade.bench.report import BenchReport
     from glshade.bench.works import BY_HAND, WORKS
     from glshade.cli import _table
-    from glshade.files import replacing
 
     if as_json and as_markdown:
         raise click.UsageError("--json and --markdown exclude each other")
@@ -86,7 +83,66 @@ def work(
         elif name == "jobs":
             report.jobs = measure_jobs(repeat, small)
         else:
-            report.contests[name] = run_contest(WORKS[name].small() if small else WORKS[name], programs, repeat)
+            report.contests[name] = measure_work(name, programs, repeat, small)
+    _show(report, as_json, as_markdown, save)
+
+
+@command.command()
+@click.argument("names", metavar="[NAME]...", nargs=-1)
+@click.option("--peers", multiple=True, metavar="NAME", help="Compares only with the programs of this library; repeatable.")
+@click.option(
+    "--repeat",
+    type=click.IntRange(1, 1000),
+    default=5,
+    show_default=True,
+    help="Number of rounds; the largest works have fewer.",
+)
+@click.option(
+    "--size", type=click.Choice(["full", "small"]), default="full", help="small: reduced works, to see that they run."
+)
+@click.option("--json", "as_json", is_flag=True, help="Prints the results as one JSON object.")
+@click.option("--markdown", "as_markdown", is_flag=True, help="Prints the tables of docs/benchmarks.md.")
+@click.option("--save", type=click.Path(path_type=Path, dir_okay=False), help="Also writes the JSON object to this file.")
+def life(
+    names: tuple[str, ...], peers: tuple[str, ...], repeat: int, size: str, as_json: bool, as_markdown: bool, save: Path | None
+) -> None:
+    """Times what people wait for: new textures, moving meshes, many objects, large files, start-up.
+
+    The works are W6 to W21, and L1 to L3, which are larger and measured only if they are named. They run beside the programs
+    of `glshade bench work` and some more; docs/benchmarks.md explains each.
+    """
+    from glshade.bench.life import homes, installed, work
+    from glshade.bench.life_contest import measure_life
+    from glshade.bench.report import BenchReport
+    from glshade.bench.works import DOOR
+    from glshade.cli import _table
+
+    if as_json and as_markdown:
+        raise click.UsageError("--json and --markdown exclude each other")
+    works = {name: work(name) for name in homes()}
+    offered = dict.fromkeys(name.split()[0] for each in works.values() for name in installed(each.programs))
+    libraries = {DOOR, *_table.chosen(peers, offered, "installed peer")}
+    report = BenchReport(repeat, size == "small")
+    wanted = _table.chosen(names, works, "work") if names else [name for name, each in works.items() if not each.on_request]
+    for name in dict.fromkeys(wanted):
+        click.echo(f"{name} ...", err=True)
+        programs = [program for program in installed(works[name].programs) if program.split()[0] in libraries]
+        report.contests[name] = measure_life(name, programs, repeat, report.small)
+    _show(report, as_json, as_markdown, save)
+
+
+def _show(report: BenchReport, as_json: bool, as_markdown: bool, save: Path | None) -> None:
+    """Prints a report, as JSON, as Markdown or as tables for people, and writes the JSON to the file `save`.
+
+    Errors: GlshadeError if glshade itself failed at a work, after the report is printed.
+    """
+    import json
+
+    from glshade.bench.report import markdown
+    from glshade.cli import _table
+    from glshade.errors import GlshadeError
+    from glshade.files import replacing
+
     if save is not None:
         with replacing(save) as beside:
             beside.write_text(json.dumps(report.as_dict(), indent=1) + "\n", encoding="utf-8")
@@ -96,6 +152,8 @@ def work(
         click.echo(markdown(report), nl=False)
     else:
         _print(report)
+    if failed := report.failed:
+        raise GlshadeError(f"glshade could not be measured at {', '.join(failed)}; the reasons are in the tables")
 
 
 def _print(report: BenchReport) -> None:

@@ -83,6 +83,12 @@ def _show(model: dict[str, Any]) -> None:
             ("option", "default", "choices", "meaning"),
             [(item["name"], item["default"], ", ".join(item["choices"]), item["description"]) for item in model["options"]],
         )
+    if model["keys"]:
+        click.echo()
+        _table.table(
+            ("key", "takes", "default", "meaning"),
+            [(item["name"], item["takes"], _table.value(item["default"]), item["description"]) for item in model["keys"]],
+        )
     click.echo()
     if not model["reference"]:
         _table.paragraph(

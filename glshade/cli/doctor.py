@@ -222,5 +222,7 @@ def _table(measured: dict[str, Any]) -> list[tuple[str, str]]:
         ("clipping", _CLIPPING[measured["clips_at_sides"]]),
         ("level of detail", _level_of_detail(measured["level_of_detail"])),
         ("filter weights", f"off by {measured['filter_weight_error']:.1e} texels"),
+        ("sRGB decoding", f"off by {measured['srgb_decoding']['error']:.2g} of an 8-bit code"),
+        ("table weights", f"off by {measured['table_weight_error']:.1e} texels"),
         ("samples", " ".join(f"({x:g}, {y:g})" for x, y in measured["sample_positions"]) or "none"),
     ]

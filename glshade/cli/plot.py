@@ -90,6 +90,13 @@ class Angles(click.ParamType[tuple[float, ...]]):
 @click.option(
     "--bare", is_flag=True, help="Writes only the picture of --kind lobe, sphere or furnace, in any format of `glshade render`."
 )
+@click.option(
+    "--fit",
+    default="ggx",
+    show_default=True,
+    metavar="MODEL",
+    help="Model that is fitted to a file of measurements, beside it.",
+)
 @driver
 @shaders
 @models
@@ -104,19 +111,22 @@ def command(
     quantity: str,
     scale: Any,
     bare: bool,
+    fit: str,
     backend: Any,
     device: int | None,
     shaders: tuple[str, ...],
     models: tuple[str, ...],
 ) -> None:
-    """Plots the reflectance of materials.
+    """Plots the reflectance of materials, or of a file of measurements.
 
-    Plots each MATERIAL over the others in one figure. A MATERIAL is a model, a preset, or a material of a scene:
+    Plots each MATERIAL over the others in one figure. A MATERIAL is a model, a preset, or a material of a scene. In place of
+    materials there may be one FILE of measured reflectance, which is plotted beside a fitted model:
 
     \b
       MODEL    phong    phong:exponent=100    plastic:kd=0.6,0.1,0.05,ior=1.7
       PRESET   gold     gold:roughness=0.5
       SCENE    ball.toml    ball.toml:red    ball.toml:red:ks=0.5
+      FILE     krylon_blue.brdf    gold.binary    felt.alta
 
     Kinds: polar shows slices of the lobe in the plane of incidence; lobe shows the lobe as a solid; sphere shows a sphere under
     one light; furnace shows a sphere under a white sky, where it is invisible if no energy is lost; albedo shows the reflected
@@ -128,12 +138,16 @@ def command(
       glshade plot phong:exponent={5,50,500} -k polar -k sphere -o exponents.png
       glshade plot ggx beckmann -p roughness=0.3 -k albedo -o rough.svg
       glshade plot plastic -k lobe --scale log --bare -o lobe.png
+      glshade plot krylon_blue.brdf --fit ward -o krylon.svg
     """
     import math
 
     from glshade.catalogue import figures as plots
     from glshade.cli._material import materials as named
 
+    if len(materials) == 1 and _is_measured(materials[0]):
+        _plot_measured(Path(materials[0]), output, fit)
+        return
     wanted: Any = plots.KINDS if not kinds or "all" in kinds else tuple(dict.fromkeys(kinds))
     if bare and (len(wanted) != 1 or wanted[0] not in plots.PICTURES):
         raise click.UsageError("--bare needs one --kind that is a picture: lobe, sphere or furnace")
@@ -170,6 +184,35 @@ def command(
         else:
             radians = tuple(math.radians(angle) for angle in angles)
             plots.save(plots.figure(chosen, wanted, angles=radians, scale=scale, renderer=renderer, **options), output)
+    click.echo(str(output))
+
+
+def _is_measured(text: str) -> bool:
+    """Returns whether a text of the command line names a file of measured reflectance: a file that is no scene."""
+    return Path(text).suffix.lower() not in ("", ".toml", ".json") and ":" not in text and Path(text).is_file()
+
+
+def _plot_measured(file: Path, output: Path | None, name: str) -> None:
+    """Plots a file of measured reflectance beside a fit of the model of this name. Errors: GlshadeError, click.BadParameter."""
+    from glshade.brdfs import BRDFS
+    from glshade.catalogue import figures, measured_figures
+    from glshade.catalogue.fitting import fit_model
+    from glshade.document import nearest
+    from glshade.measured.file import load
+    from glshade.measured.reading import read
+    from glshade.measured.samples import Samples, points
+    from glshade.measured.tabulation import is_grained
+
+    output = output or Path(file.stem + ".svg")
+    figures.check()
+    figures.check_suffix(output)
+    if name not in BRDFS or not BRDFS[name].has_reference:
+        raise click.BadParameter(f"no model that can be fitted is named {name!r}{nearest(name, BRDFS)}", param_hint="'--fit'")
+    measurement = read(file)
+    grained = isinstance(measurement, Samples) and is_grained(measurement)
+    samples = points(measurement, 20_000)
+    drawn = measured_figures.figure(file.name, samples, None if grained else load(file), fit_model(measurement, BRDFS[name]))
+    figures.save(drawn, output)
     click.echo(str(output))
 
 

@@ -201,6 +201,12 @@ def command(
     files exists, unless --overwrite, --skip-existing or --resume is given.
     """
     since = perf_counter()
+    several = len(scenes) > 1 or len(cameras) > 1 or frames is not None or bool(sweeps) or cluster is not None
+    if not several and not reference and backend in ("auto", "egl") and device is None:
+        from glshade.gl.egl import load_ahead
+
+        # This process draws the picture itself, and needs a driver once it has read the scene.
+        load_ahead()
     from glshade.batch.batch import Means, Wanted, existing, make
     from glshade.image.file import check_suffix
 

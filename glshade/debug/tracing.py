@@ -11,15 +11,16 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from glshade.brdfs import Brdf, numbers
+from glshade.brdfs import Brdf
 from glshade.debug.instrument import can_be_kept, instrumented
 from glshade.errors import ContextError, ShaderError
 from glshade.gl.context import Context, open_context
 from glshade.gl.evaluation import run_on_gpu
+from glshade.gl.tables import Inputs
 from glshade.glsl.generator import value_code
 from glshade.glsl.shaders import Shaders, current
 from glshade.glsl.source import Code, Stage
-from glshade.glsl.uniforms import Values
+from glshade.glsl.uniforms import model_inputs
 from glshade.scene.models import Folders, paths, use_models
 from glshade.spirv.arithmetic import FLOAT32, FLOAT64, TINY, Arithmetic
 from glshade.spirv.digits import ROUNDING
@@ -130,7 +131,7 @@ def trace(
     pair = [np.asarray(d, dtype=np.float32).reshape(-1) for d in (l, v)]
     if any(d.shape != (3,) for d in pair):
         raise ValueError(f"l and v must have shape (3,), not {np.shape(l)} and {np.shape(v)}")
-    values = {f"u_{name}": value for name, value in numbers(brdf).items()}
+    values = model_inputs(brdf)
     text = model_text(brdf, files)
     inputs = {"a_l": pair[0][None], "a_v": pair[1][None], **values}
     exact, single = (_recorded(text, inputs, arithmetic) for arithmetic in (FLOAT64, FLOAT32))
@@ -168,7 +169,7 @@ def _recorded(text: ValueText, inputs: Mapping[str, Any], arithmetic: Arithmetic
 def _on_gpu(
     context: Context | None,
     code: Mapping[str, Code | str],
-    values: Values,
+    values: Inputs,
     pair: list[Array],
     shaders: Shaders,
     steps: list[Step],
@@ -204,7 +205,7 @@ def _in_stage(
     context: Context,
     stage: StageName,
     code: Mapping[str, Code | str],
-    values: Values,
+    values: Inputs,
     pair: list[Array],
     shaders: Shaders,
     wanted: Mapping[int, Step],

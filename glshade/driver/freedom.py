@@ -55,13 +55,16 @@ def freedom_of(name: str, found: dict[str, Any]) -> Freedom:
     # A driver with a finer grid than the reference's moves corners by less than the reference does.
     step = 1 / min(2**bits, SUBPIXELS)
     rule, error = found["level_of_detail"]["rule"], found["level_of_detail"]["error"]
-    weight = found["filter_weight_error"]
+    weight, in_table = found["filter_weight_error"], found["table_weight_error"]
     return Freedom(
         name,
         snap=step if abs(shift) > SNAPPED else 0.0,
         rules=UNMEASURED.rules if rule is None else (rule,),
         level=max(RESERVE * error, LEAST_LEVEL),
         texel=RESERVE * weight if weight > FLOAT_WEIGHT else 0.0,
+        table=RESERVE * in_table if in_table > FLOAT_WEIGHT else 0.0,
+        decoding=RESERVE * found["srgb_decoding"]["error"],
+        decoded=tuple(found["srgb_decoding"]["values"]),
         clips=found["clips_at_sides"] is not False,
         subpixel_bits=bits,
     )

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+from collections.abc import Callable
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from glshade.driver.clock import Spread, difference, seconds
 from glshade.gl.context import Context
 from glshade.gl.program import Program
 from glshade.gl.screen import Capture, Screen
+from glshade.gl.tables import Inputs, write_inputs
 from glshade.glsl.source import Source
 
 # The side of the screen [pixels], and the number of vertices. They are large enough to occupy every unit of a large GPU, and
@@ -49,25 +49,26 @@ class Workload:
         while self.rounds < MOST_ROUNDS and min(seconds(context, self.without) for _ in range(2)) < LEAST:
             self.rounds *= 2
 
-    def _drawing(self, source: Source, values: Mapping[str, Any]) -> Callable[[], None]:
-        """Returns a function that draws the program. values: name of a uniform without u_ -> its value, a float32 array."""
+    def _drawing(self, source: Source, values: Inputs) -> Callable[[], None]:
+        """Returns a function that draws the program. values: name of a uniform -> its value."""
         varyings = ("v_value",) if self.stage == "vertex" else ()
         program = Program(self.context, source, varyings)
-        for name, value in values.items():
-            program.write(f"u_{name}", value)
+        bound = write_inputs(self.context, program, values)
         program.write("u_drift", np.full(3, DRIFT, dtype=np.float32))
 
         def draw() -> None:
+            for unit, texture in enumerate(bound):
+                texture.use(unit)
             program.set_integer("u_count", self.rounds)
             self._target.draw(program)
 
         return draw
 
-    def nanoseconds(self, source: Source, values: Mapping[str, Any], repeat: int) -> Spread:
+    def nanoseconds(self, source: Source, values: Inputs, repeat: int) -> Spread:
         """Returns the time of one evaluation of the model [ns], as the spread of `repeat` measurements.
 
         source: the program with the model.
-        values: name of a uniform without u_ -> its value, a float32 array.
+        values: name of a uniform -> its value.
         Errors: ShaderError.
         """
         spread = difference(self.context, self._drawing(source, values), self.without, repeat)

@@ -9,13 +9,14 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from glshade.brdfs import Brdf, numbers, widened
+from glshade.brdfs import Brdf, widened
 from glshade.gl.context import Context, open_context
 from glshade.gl.program import Program
+from glshade.gl.tables import Inputs, write_inputs
 from glshade.glsl.generator import value_code
 from glshade.glsl.shaders import Shaders, current, expand
 from glshade.glsl.source import Code, Rewrite, Source
-from glshade.glsl.uniforms import Values
+from glshade.glsl.uniforms import model_inputs
 from glshade.scene.models import Folders, paths, use_models
 
 On = Literal["reference", "text", "vertex", "fragment"]
@@ -49,7 +50,7 @@ def evaluate(
     l, v = np.broadcast_arrays(np.asarray(l, dtype=np.float32), np.asarray(v, dtype=np.float32))
     if l.shape[-1:] != (3,):
         raise ValueError(f"l and v must have shape (..., 3), not {l.shape}")
-    values = {f"u_{name}": value for name, value in numbers(brdf).items()}
+    values = model_inputs(brdf)
     if on == "reference":
         result: NDArray[Any] = type(brdf).brdf_cos(widened(brdf), l.astype(np.float64), v.astype(np.float64))
         return result
@@ -63,8 +64,8 @@ def evaluate(
         return np.zeros(l.shape, dtype=np.float32)
     opened = context or open_context()
     try:
-        flat = run_on_gpu(opened, on, value_code(brdf), values, l.reshape(-1, 3), v.reshape(-1, 3), current(paths(shaders)))
-        return flat.reshape(l.shape)
+        pair, files = (l.reshape(-1, 3), v.reshape(-1, 3)), current(paths(shaders))
+        return run_on_gpu(opened, on, value_code(brdf), values, *pair, files).reshape(l.shape)
     finally:
         if context is None:
             opened.release()
@@ -74,7 +75,7 @@ def run_on_gpu(
     context: Context,
     on: Literal["vertex", "fragment"],
     code: Mapping[str, Code | str],
-    values: Values,
+    values: Inputs,
     l: NDArray[Any],
     v: NDArray[Any],
     shaders: Shaders,
@@ -83,7 +84,7 @@ def run_on_gpu(
     """Returns the values (N, 3) of a function of two directions, run in float32 in a stage on the GPU.
 
     code: place -> code; the place `model` defines `vec3 value(vec3 l, vec3 v)`.
-    values: name -> value of the uniforms.
+    values: name -> value of the uniforms, which may be tables.
     l, v: the directions (N, 3).
     rewrite: optional; changes the text before it is compiled.
     Errors: ShaderError.
@@ -100,10 +101,9 @@ def run_on_gpu(
     return result
 
 
-def _in_vertex_stage(context: Context, source: Source, values: Values, l: NDArray[Any], v: NDArray[Any]) -> NDArray[np.float32]:
+def _in_vertex_stage(context: Context, source: Source, values: Inputs, l: NDArray[Any], v: NDArray[Any]) -> NDArray[np.float32]:
     program = Program(context, source, varyings=("v_value",))
-    for name, value in values.items():
-        program.write(name, value)
+    bound = write_inputs(context, program, values)
     gl = context.gl
     names = [name for name in ("a_l", "a_v") if name in program.attributes]
     content = [(gl.buffer({"a_l": l, "a_v": v}[name].tobytes()), "3f", name) for name in names]
@@ -111,15 +111,16 @@ def _in_vertex_stage(context: Context, source: Source, values: Values, l: NDArra
     # Without a bound framebuffer, llvmpipe captures zeros and reports no error.
     gl.simple_framebuffer((1, 1)).use()
     gl.vertex_array(program.gl, content).transform(result, moderngl.POINTS, vertices=len(l))
+    del bound
     return np.frombuffer(result.read(), dtype=np.float32).reshape(-1, 3)
 
 
 def _in_fragment_stage(
-    context: Context, source: Source, values: Values, l: NDArray[Any], v: NDArray[Any]
+    context: Context, source: Source, values: Inputs, l: NDArray[Any], v: NDArray[Any]
 ) -> NDArray[np.float32]:
     program = Program(context, source)
-    for name, value in values.items():
-        program.write(name, value)
+    # Textures on the first two units hold the directions.
+    bound = write_inputs(context, program, values, first=2)
     gl = context.gl
     width = min(len(l), 4096)
     height = -(-len(l) // width)
@@ -136,4 +137,5 @@ def _in_fragment_stage(
     gl.vertex_array(program.gl, []).render(moderngl.TRIANGLES, vertices=3)
     out = np.empty((height, width, 4), dtype=np.float32)
     target.read_into(out, components=4, dtype="f4")
+    del bound
     return out.reshape(-1, 4)[: len(l), :3]

@@ -85,6 +85,10 @@ class Frame:
         corner: the pixel (x, y) of the frame that becomes its upper left one.
         """
         self.resolve()
+        self.read(out, corner)
+
+    def read(self, out: NDArray[Any], corner: tuple[int, int] = (0, 0)) -> None:
+        """Copies pixels of the frame into an array, as `readback` does; valid after resolve()."""
         height, width, _ = out.shape
         dtype = "f1" if out.dtype == np.uint8 else "f4"
         self._resolved.read_into(out, (*corner, width, height), components=4, alignment=1, dtype=dtype)

@@ -11,11 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.assembly.assembly import Assembly
+from glshade.assembly.illumination import wavelengths_of
 from glshade.assembly.part import Part
 from glshade.gl.tiles import Offset, shifts
 from glshade.image import cryptomatte
 from glshade.image.image import Image
-from glshade.image.layers import Layers, names_attribute
+from glshade.image.layers import SPECTRAL_ATTRIBUTES, Layers, names_attribute, spectral_name
 from glshade.radiance.readying import ready
 from glshade.scene import labels
 from glshade.scene.film import Film
@@ -159,6 +160,18 @@ class _Maker:
 
     def albedo(self) -> Arrays:
         return {"albedo": self._draw(Part("albedo"))[..., :3]}
+
+    def spectrum(self) -> Arrays:
+        arrays: Arrays = {}
+        self.attributes |= SPECTRAL_ATTRIBUTES
+        wavelengths = wavelengths_of(self._scene.film.bands)
+        for first in range(0, len(wavelengths), 3):
+            pixels = self._draw(Part("spectrum", first))
+            arrays |= {
+                spectral_name(wavelength): pixels[..., [channel]]
+                for channel, wavelength in enumerate(wavelengths[first : first + 3])
+            }
+        return arrays
 
     def background(self) -> Arrays:
         return {"background": self._draw(Part("dark"))[..., :3]}

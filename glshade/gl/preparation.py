@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import moderngl
@@ -17,20 +18,36 @@ from glshade.assembly.culling import WORTHWHILE, facing
 from glshade.assembly.instance import Instance
 from glshade.errors import SceneError
 from glshade.gl.frame import FORMATS, Storage
+from glshade.gl.instances import PLACEMENT, InstanceBuffers, upload
 from glshade.gl.program import Program
 from glshade.gl.resources import Resources, texture_size
+from glshade.glsl.batch import Batch, batches
 from glshade.glsl.generator import generate
 from glshade.glsl.plan import PAGE, ProgramPlan
-from glshade.glsl.planner import further_plan, plan_instance, viewer_of
+from glshade.glsl.planner import further_plan, plans, viewer_of
 from glshade.glsl.shaders import Shaders
 from glshade.glsl.source import Rewrite
-from glshade.glsl.uniforms import Values, exposed_uniforms, light_pages, light_uniforms, object_uniforms, textures
+from glshade.glsl.uniforms import (
+    Values,
+    exposed_uniforms,
+    light_pages,
+    light_uniforms,
+    object_uniforms,
+    placement_uniforms,
+    textures,
+)
 from glshade.mesh.mesh import Mesh
 from glshade.scene.scene import Scene
+from glshade.textures.texels import Texels
+from glshade.textures.volume import Volume
 
 Encoding = Literal["linear", "srgb"]
 # A page of lights: the group's key, the buffer that holds the lights, and their number.
 Page = tuple[str, moderngl.Buffer, int]
+# (id of a plan, indices of lights) -> the uniforms of the lights, and their pages for each group without an exact count.
+Shared = dict[tuple[int, tuple[int, ...]], tuple[Values, list[list[Page]]]]
+# The formats that store no negative numbers.
+UNSIGNED = frozenset({"rgba8", "rgb10_a2", "r11f_g11f_b10f"})
 # Flat inputs are used for pictures with at least this many pixels per triangle. Measurements on llvmpipe, with one and with
 # eight lights, show that they save time in such pictures.
 FLAT_PIXELS = 8
@@ -44,26 +61,35 @@ class ApproximateWarning(UserWarning):
 class DrawCall:
     """One draw call, with the state to set before it.
 
-    instance: the instance that is drawn.
+    instances: the instances that are drawn; several share one call if they differ only in their transforms and in numbers.
+    mirrored: whether their transforms mirror, which turns counter-clockwise triangles into clockwise ones.
     plan: the plan of its program.
     program: the compiled program.
-    vertices: the vertex array of the instance, with its triangles in drawing order.
-    values: the uniforms of the object and its material.
+    vertices: the vertex array of the instances, with their triangles in drawing order.
+    values: the uniforms that all of the instances share.
     samplers: (uniform name, texture) of each sampler.
     lights: the uniforms of the groups of lights that have an exact count.
     pages: the pages of the other lights, which are bound as uniform blocks.
     added: whether this call draws a further page of lights and adds its light to the pixels of the first call.
+    buffers: the values that differ among several instances; None for a single one.
     """
 
-    instance: Instance
+    instances: tuple[Instance, ...]
+    mirrored: bool
     plan: ProgramPlan
     program: Program
     vertices: moderngl.VertexArray
     values: Values
-    samplers: list[tuple[str, moderngl.Texture]]
+    samplers: list[tuple[str, moderngl.Texture | moderngl.Texture3D]]
     lights: Values
     pages: list[Page]
     added: bool = False
+    buffers: InstanceBuffers | None = None
+
+    @property
+    def instance(self) -> Instance:
+        """The first of its instances. All of them share its mesh, its lights and the sides that are drawn."""
+        return self.instances[0]
 
 
 @dataclass(eq=False)
@@ -93,10 +119,14 @@ class Prepared:
 
     @property
     def size(self) -> int:
-        """The approximate size of the data that it keeps alive [bytes]: textures, and meshes on the CPU and the GPU."""
+        """The approximate size of the data that it keeps alive [bytes].
+
+        These are textures, the values of instances, and meshes on the CPU and the GPU.
+        """
         texture_sizes = {id(texture): texture_size(texture) for call in self.calls for _, texture in call.samplers}
         mesh_sizes = {id(call.instance.mesh): _mesh_size(call.instance.mesh) for call in self.calls}
-        return sum(texture_sizes.values()) + sum(mesh_sizes.values())
+        instances = sum(call.buffers.size for call in self.calls if call.buffers)
+        return sum(texture_sizes.values()) + instances + sum(mesh_sizes.values())
 
     @property
     def blends(self) -> bool:
@@ -115,6 +145,9 @@ class Prepared:
             return "rgba32f"
         if chosen == "r11f_g11f_b10f" and any(light.is_negative for light in self.assembly.lights):
             raise SceneError("quality.storage: r11f_g11f_b10f has nothing below zero, and a light of this scene is negative")
+        bands = any(share.weights is not None for instance in self.assembly.instances for share in instance.shares)
+        if bands and chosen in UNSIGNED:
+            raise SceneError(f"quality.storage: {chosen} has nothing below zero, which bands of wavelengths need")
         if FORMATS[chosen][1] == 3 and (len(self.scene.film.background) == 4 or self.blends):
             raise SceneError(f"quality.storage: {chosen} has no alpha, which this scene asks for")
         return chosen
@@ -167,33 +200,61 @@ class _Calls:
         self._resources, self._context = resources, resources.context
         self._assembly, self._exposure = assembly, scene.film.exposure
         self._shaders, self._rewrite = shaders, rewrite
-        self._programs: dict[ProgramPlan, Program] = {}
-        # Equal values share one array, by which the renderer sees that a program has the value already.
+        self._programs: dict[tuple[ProgramPlan, tuple[str, ...]], Program] = {}
+        # Equal values are one array, by which the renderer sees that a program has the value already.
         self._arrays: dict[tuple[str, bytes], NDArray[np.float32]] = {}
         self.files: frozenset[str] = frozenset()
-        triangles = sum(len(instance.mesh.triangles) for instance in assembly.instances)
-        width, height = scene.film.size
+        self._pixels = scene.film.size[0] * scene.film.size[1]
         # Where all samples of a pixel are at its centre, so is the centroid.
         self._scaled = scene.film.samples > 1 and assembly.view.perspective
-        self._flat = self._context.is_software and triangles * FLAT_PIXELS <= width * height
+
+    @cached_property
+    def _flat(self) -> bool:
+        """Whether the programs get flat inputs."""
+        triangles = sum(instance.mesh.counts[1] for instance in self._assembly.instances)
+        return self._context.is_software and triangles * FLAT_PIXELS <= self._pixels
 
     def draw_calls(self, encoding: Encoding) -> Iterator[DrawCall]:
         """Yields the draw calls: opaque instances grouped by program, then blended ones from back to front."""
-        opaque: list[tuple[ProgramPlan, Instance]] = []
-        blended: list[tuple[ProgramPlan, Instance]] = []
-        for instance in self._assembly.instances:
-            plan = replace(plan_instance(instance, self._assembly, encoding), scaled=self._scaled)
-            (blended if plan.alpha == "blend" else opaque).append((plan, instance))
-        order = {plan: index for index, (plan, _) in reversed(list(enumerate(opaque)))}
-        opaque.sort(key=lambda pair: order[pair[0]])
-        shared: dict[tuple[ProgramPlan, tuple[int, ...]], tuple[Values, list[list[Page]]]] = {}
-        for plan, instance in (*opaque, *self._back_to_front(blended)):
-            key = plan, instance.lights
-            if key not in shared:
-                lights = light_uniforms(plan, self._assembly, instance.lights, self._exposure)
-                _check_finite(instance, lights)
-                shared[key] = lights, self._pages(plan, instance)
-            yield from self._of_instance(plan, instance, *shared[key])
+        yield from self._opaque(self._assembly.first_parts(), encoding)
+        # Further parts add to the fragments that the first parts drew.
+        for call in self._opaque(self._assembly.further_parts(), encoding):
+            call.added = True
+            yield call
+        yield from self._blended(encoding)
+
+    def _opaque(self, assembly: Assembly, encoding: Encoding) -> Iterator[DrawCall]:
+        """Yields the draw calls of the opaque instances of an assembly of instances without shares."""
+        shared: Shared = {}
+        for batch in batches(assembly, plans(assembly, encoding, self._scaled), self._exposure):
+            lights, pages = self._lights(batch.plan, batch.instances[0], shared)
+            if len(batch.instances) > 1:
+                yield self._of_batch(batch, lights)
+            else:
+                yield from self._of_instance(batch, lights, pages)
+
+    def _blended(self, encoding: Encoding) -> Iterator[DrawCall]:
+        """Yields the draw calls of the blended instances from back to front, all parts of an instance one after the other."""
+        parts = [(part, number > 0) for instance in self._back_to_front() for number, part in enumerate(instance.parts)]
+        assembly = replace(self._assembly, instances=tuple(part for part, _ in parts))
+        shared: Shared = {}
+        for plan, (part, is_added) in zip(plans(assembly, encoding, self._scaled), parts, strict=True):
+            for call in self._of_instance(Batch(plan, (part,), part.mirrored), *self._lights(plan, part, shared)):
+                call.added |= is_added
+                yield call
+
+    def _lights(self, plan: ProgramPlan, instance: Instance, shared: Shared) -> tuple[Values, list[list[Page]]]:
+        """Returns the uniforms of the groups of lights that have an exact count, and the pages of the other groups.
+
+        shared: those of earlier calls, which share the tables if they have the same plan and the same lights. Equal plans must
+            be one object.
+        """
+        key = id(plan), instance.lights
+        if key not in shared:
+            lights = light_uniforms(plan, self._assembly, instance.lights, self._exposure)
+            _check_finite(instance, lights)
+            shared[key] = lights, self._pages(plan, instance)
+        return shared[key]
 
     def seen_anew(self, before: Prepared) -> list[DrawCall] | None:
         """Returns the draw calls of a prepared scene for another view; None where more than their uniforms may differ."""
@@ -202,7 +263,7 @@ class _Calls:
         if plan.viewer != viewer_of(view) or plan.scaled != self._scaled or before.blends or any(call.pages for call in calls):
             return None
         if before.worlds is None:
-            before.worlds = np.stack([call.instance.world_from_object for call in calls])
+            before.worlds = np.array([instance.world_from_object for call in calls for instance in call.instances])
         relative = before.worlds.copy()
         relative[:, :3, 3] -= view.eye
         with np.errstate(over="ignore"):
@@ -211,25 +272,32 @@ class _Calls:
             return None  # the full preparation reports the object
         # Calls share the table of their lights if they have the same plan and the same lights.
         shared: dict[int, Values] = {}
-        result = []
-        for call, world in zip(calls, placed, strict=True):
+        result, start = [], 0
+        for call in calls:
             instance, plan, lights = call.instance, call.plan, shared.get(id(call.lights))
             if lights is None:
                 lights = shared[id(call.lights)] = light_uniforms(plan, self._assembly, instance.lights, self._exposure)
                 _check_finite(instance, lights)
-            samplers, vertices = call.samplers, call.vertices
+            samplers, vertices, values, buffers = call.samplers, call.vertices, call.values, call.buffers
             if samplers:
                 # A picture's file may have changed.
-                texels = textures(plan, instance.material)
-                samplers = [(name, self._resources.texture(found)) for name, found in texels.items()]
-            if len(instance.mesh.triangles) >= WORTHWHILE:
-                vertices = self._resources.vertices.array(instance.mesh, call.program, facing(instance, view))
-            values = {**call.values, "u_world_from_object": world}
-            result.append(DrawCall(instance, plan, call.program, vertices, values, samplers, lights, []))
+                samplers = self._samplers(textures(plan, instance.material))
+            if buffers is not None:
+                buffers = buffers.placed(self._context, placed[start : start + buffers.count])
+                vertices = self._resources.vertices.instanced(instance.mesh, call.program, buffers)
+            else:
+                values = {**values, PLACEMENT: placed[start]}
+                if instance.mesh.counts[1] >= WORTHWHILE:
+                    vertices = self._resources.vertices.array(instance.mesh, call.program, facing(instance, view))
+            start += len(call.instances)
+            result.append(replace(call, vertices=vertices, values=values, samplers=samplers, lights=lights, buffers=buffers))
         return result
 
-    def _back_to_front(self, blended: list[tuple[ProgramPlan, Instance]]) -> list[tuple[ProgramPlan, Instance]]:
-        """Blended instances, ordered by the mean of their vertices, the farthest first."""
+    def _back_to_front(self) -> list[Instance]:
+        """Returns the blended instances, ordered by the mean of their vertices, the farthest first."""
+        # A property of a blended surface, such as its depth, is drawn as that of an opaque one.
+        lit = (instance for instance in self._assembly.instances if instance.shows == "light")
+        blended = [instance for instance in lit if instance.material.alpha_mode == "blend"]
         if not blended:
             return []
         warnings.warn(
@@ -238,17 +306,15 @@ class _Calls:
             stacklevel=7,
         )
         middles = []
-        for _, instance in blended:
+        for instance in blended:
             world = instance.world_from_object
             middles.append(world[:3, 3] + world[:3, :3] @ instance.mesh.positions.mean(axis=0, dtype=np.float64))
         depths = self._assembly.view.depth(np.array(middles))
         return [blended[i] for i in np.argsort(-depths, kind="stable")]
 
-    def _of_instance(
-        self, plan: ProgramPlan, instance: Instance, lights: Values, pages: list[list[Page]]
-    ) -> Iterator[DrawCall]:
-        """Yields the first draw call of an instance, and one more for every further page of lights."""
-        assembly = self._assembly
+    def _of_instance(self, batch: Batch, lights: Values, pages: list[list[Page]]) -> Iterator[DrawCall]:
+        """Yields the first draw call of a single instance, and one more for every further page of lights."""
+        assembly, plan, instance = self._assembly, batch.plan, batch.instances[0]
         triangles = _sorted_triangles(instance, assembly) if plan.alpha == "blend" else facing(instance, assembly.view)
         for index in range(max((len(group) for group in pages), default=1)):
             page_plan = plan if index == 0 else further_plan(plan, instance, [len(group) for group in pages], index)
@@ -256,20 +322,46 @@ class _Calls:
             values = object_uniforms(page_plan, instance, assembly.view.eye)
             values |= exposed_uniforms(page_plan, instance, assembly, self._exposure)
             _check_finite(instance, values)
-            values = {name: self._arrays.setdefault((name, value.tobytes()), value) for name, value in values.items()}
-            all_texels = textures(page_plan, instance.material)
-            samplers = [(name, self._resources.texture(texels)) for name, texels in all_texels.items()]
+            values = self._interned(values)
+            samplers = self._samplers(textures(page_plan, instance.material))
             vertices = self._resources.vertices.array(instance.mesh, program, triangles)
             page = [group[index] for group in pages if index < len(group)]
             page_lights = {} if index else lights
-            yield DrawCall(instance, page_plan, program, vertices, values, samplers, page_lights, page, bool(index))
+            yield DrawCall(
+                batch.instances, batch.mirrored, page_plan, program, vertices, values, samplers, page_lights, page, bool(index)
+            )
 
-    def _program(self, plan: ProgramPlan) -> Program:
-        if plan not in self._programs:
+    def _of_batch(self, batch: Batch, lights: Values) -> DrawCall:
+        """Returns the draw call of several instances."""
+        plan, first = batch.plan, batch.instances[0]
+        varying = placement_uniforms(plan, batch.instances, self._assembly.view.eye) | batch.varying
+        for name, value in varying.items():
+            finite = np.isfinite(value.reshape(len(value), -1)).all(axis=1)
+            _check_finite(batch.instances[int(finite.argmin())], {name: value})
+        _check_finite(first, batch.common)
+        program = self._program(plan, tuple(varying))
+        buffers = upload(self._context, program, varying)
+        vertices = self._resources.vertices.instanced(first.mesh, program, buffers)
+        samplers = self._samplers(textures(plan, first.material))
+        values = self._interned(batch.common)
+        return DrawCall(batch.instances, batch.mirrored, plan, program, vertices, values, samplers, lights, [], buffers=buffers)
+
+    def _interned(self, values: Values) -> Values:
+        """Returns the values, equal ones as one array."""
+        return {name: self._arrays.setdefault((name, value.tobytes()), value) for name, value in values.items()}
+
+    def _samplers(self, texels: Mapping[str, Texels | Volume]) -> list[tuple[str, moderngl.Texture | moderngl.Texture3D]]:
+        """Returns the texture of each sampler, from the cache."""
+        return [(name, self._resources.texture(each)) for name, each in texels.items()]
+
+    def _program(self, plan: ProgramPlan, varying: tuple[str, ...] = ()) -> Program:
+        """Returns the program of a plan. varying: the uniforms that are attributes of the instances."""
+        if (plan, varying) not in self._programs:
             source = generate(plan, self._shaders)
             self.files |= source.files
-            self._programs[plan] = self._resources.program(self._rewrite(source) if self._rewrite else source, self._flat)
-        return self._programs[plan]
+            source = self._rewrite(source) if self._rewrite else source
+            self._programs[plan, varying] = self._resources.program(source, self._flat, varying)
+        return self._programs[plan, varying]
 
     def _pages(self, plan: ProgramPlan, instance: Instance) -> list[list[Page]]:
         """Returns the pages of lights of each group that has no exact count."""
@@ -285,9 +377,10 @@ class _Calls:
 def _mesh_size(mesh: Mesh) -> int:
     """Returns the approximate size of a mesh on the CPU and the GPU together [bytes].
 
-    All attributes of a vertex together count as three times its position.
+    All attributes of a vertex together count as three times its position of 12 bytes, which is the size of a triangle, too.
     """
-    return 2 * (mesh.triangles.nbytes + 3 * mesh.positions.nbytes)
+    vertices, triangles = mesh.counts
+    return 2 * 12 * (triangles + 3 * vertices)
 
 
 def _check_finite(instance: Instance, values: Values) -> None:

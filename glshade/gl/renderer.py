@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from time import perf_counter
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Literal, get_args
@@ -12,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.arrays import rounded
-from glshade.assembly.assembly import seen_anew
+from glshade.assembly.assembly import Assembly, seen_anew
+from glshade.gl.background import covered, surrounded
 from glshade.gl.context import Backend, Context, open_context
+from glshade.gl.drawing import Drawing
 from glshade.gl.frame import Box, Frame
 from glshade.gl.preparation import DrawCall, Encoding, Prepared, Preparer
-from glshade.gl.resources import Resources
+from glshade.gl.resources import Resources, frame_size
 from glshade.gl.tiles import TILE, Offset, passes, pieces
 from glshade.glsl.generator import encoder
 from glshade.glsl.shaders import Shaders, current
@@ -27,6 +31,7 @@ from glshade.lru import Lru
 from glshade.radiance.readying import ready
 from glshade.scene.camera import Camera, window
 from glshade.scene.digest import scene_digest
+from glshade.scene.film import Film
 from glshade.scene.models import Folders, paths, use_models
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
@@ -39,6 +44,46 @@ if TYPE_CHECKING:
 DType = Literal["uint8", "float32"]
 # The limits of the cache of prepared scenes: their number, and their size [bytes]. An animation alternates between few scenes.
 SCENES, SCENES_SIZE = 8, 96 << 20
+# `render_many` reads pictures back together while their frames take at most this much memory [bytes].
+TOGETHER = 64 << 20
+
+
+@dataclass(frozen=True, eq=False)
+class _Job:
+    """A picture that is ready to draw.
+
+    prepared: its scene.
+    sample_offsets: the offsets of the pictures to average [pixels].
+    direct: whether the programs write the encoded picture.
+    on_gpu: whether the picture is read from the GPU in its final 8 bits.
+    dtype: the type of its pixels.
+    transform: the view transform that is applied on the CPU; None for the film's encoding.
+    """
+
+    prepared: Prepared
+    sample_offsets: list[Offset]
+    direct: bool
+    on_gpu: bool
+    dtype: DType
+    transform: Callable[[Image], Image] | None
+
+
+@dataclass(frozen=True, eq=False)
+class _Drawn:
+    """A picture that was drawn into a frame and is not yet read.
+
+    job: the picture.
+    number: its number.
+    place: the number of the frame.
+    frame: the frame.
+    part: the pixels of the frame to read.
+    """
+
+    job: _Job
+    number: int
+    place: int
+    frame: Frame
+    part: Box
 
 
 class Renderer:
@@ -79,8 +124,6 @@ class Renderer:
         self.resources = Resources(self.context)
         self._preparer = Preparer(self.resources)
         self._prepared: Lru[tuple[Any, ...], Prepared] = Lru(SCENES_SIZE, most=SCENES)
-        # The scene that was prepared last, with its key in the cache apart from the scene itself.
-        self._newest: tuple[tuple[Any, ...], Prepared] | None = None
         # A context is current in one thread at most. Whoever draws enters it.
         self.context.leave()
 
@@ -104,20 +147,19 @@ class Renderer:
             both allow.
         Errors: ValueError, SceneError, ShaderError.
         """
-        for given, allowed in ((dtype, get_args(DType)), (shading, (None, *get_args(Rate)))):
-            if given not in allowed:
-                raise ValueError(f"{given!r} is none of {', '.join(map(repr, allowed))}")
+        _check_choices(dtype, shading)
         # Another renderer, or another program in this process, may have made its own context current.
         with self.context.gl:
             self.context.gl.gc()
-            return self._render(scene, dtype, shading, tile)
+            return self._picture(self._job(scene, dtype, shading), tile)
 
     def render_many(
         self, scene: Scene, cameras: Iterable[Camera | str], *, dtype: DType = "uint8", shading: Rate | None = None
     ) -> NDArray[Any]:
         """Returns the pictures (N, H, W, 3 or 4) of a scene through N cameras, each as `render` returns it.
 
-        The pictures are drawn one after another; what does not depend on the camera is prepared once.
+        Everything that does not depend on the camera is prepared once. Small pictures are read back together, so that the
+        driver draws one while the next is prepared.
 
         scene: the scene to draw.
         cameras: cameras, or names of the scene's `cameras`. All pictures must have one size.
@@ -125,19 +167,83 @@ class Renderer:
         Errors: ValueError for no cameras, and for pictures of several sizes; KeyError for a name that the scene does not have;
         SceneError, ShaderError.
         """
-        pictures: NDArray[Any] | None = None
         chosen = [scene.cameras[camera] if isinstance(camera, str) else camera for camera in cameras]
-        with self.context.gl:
-            for number, camera in enumerate(chosen):
-                pixels = self.render(scene.through(camera), dtype=dtype, shading=shading).pixels
-                if pictures is None:
-                    pictures = np.empty((len(chosen), *pixels.shape), dtype=pixels.dtype)
-                if pixels.shape != pictures.shape[1:]:
-                    raise ValueError(f"camera {number} gives a picture of another size; set the film's size for all")
-                pictures[number] = pixels
-        if pictures is None:
+        _check_choices(dtype, shading)
+        if not chosen:
             raise ValueError("there are no cameras")
+        scenes = [scene.through(camera) for camera in chosen]
+        sizes = [each.film.window[2:] for each in scenes]
+        for number, size in enumerate(sizes):
+            if size != sizes[0]:
+                raise ValueError(f"camera {number} gives a picture of another size; set the film's size for all")
+        width, height = sizes[0]
+        channels = len(scene.film.background)
+        pictures = np.empty((len(scenes), height, width, channels), dtype=dtype)
+        with self.context.gl:
+            self.context.gl.gc()
+            drawn: list[_Drawn] = []
+            job: _Job | None = None
+            boxes: tuple[Box, Box] | None = None
+            for number, each in enumerate(scenes):
+                following = self._following(job, each) if job else None
+                job = following or self._job(each, dtype, shading)
+                if following is None:
+                    boxes = self._only_piece(job)
+                if boxes is None:
+                    pictures[number] = self._picture(job).pixels
+                    continue
+                drawn.append(self._drawn(job, boxes, number, len(drawn)))
+                if (len(drawn) + 1) * frame_size(drawn[-1].frame) > TOGETHER:
+                    self._collect(drawn, pictures)
+                    drawn = []
+            self._collect(drawn, pictures)
         return pictures
+
+    def _following(self, job: _Job, scene: Scene) -> _Job | None:
+        """Returns the picture of a scene that shares all but its camera and perhaps its film with the last picture's scene.
+
+        The result is None where more than the view has to be prepared.
+        """
+        prepared = self._seen_from(job.prepared, scene) if job.prepared.scene.film is scene.film else None
+        if prepared is None:
+            return None
+        self.last_prepared = prepared
+        return replace(job, prepared=prepared)
+
+    def _only_piece(self, job: _Job) -> tuple[Box, Box] | None:
+        """Returns the boxes of a picture that is one drawing, as `pieces` yields them; None for other pictures."""
+        single = len(job.sample_offsets) == 1 and (job.on_gpu or job.dtype == "float32")
+        boxes = list(pieces(job.prepared.scene.film, self._side(job.prepared.scene.film, None))) if single else []
+        return boxes[0] if len(boxes) == 1 else None
+
+    def _drawn(self, job: _Job, boxes: tuple[Box, Box], number: int, place: int) -> _Drawn:
+        """Draws a picture into a frame of its own, without waiting for the driver.
+
+        job: the picture.
+        boxes: as `_only_piece` returns them.
+        number: the number of the picture.
+        place: the number of pictures that are drawn already and not yet read.
+        """
+        frame, part = self._begun(job.prepared, *boxes, job.direct, place)
+        self._draw_shifted(job.prepared, frame, *boxes, job.sample_offsets[0], job.direct)
+        return _Drawn(job, number, place, frame, part)
+
+    def _collect(self, drawn: list[_Drawn], pictures: NDArray[Any]) -> None:
+        """Copies drawn pictures into the array of all pictures (N, H, W, channels)."""
+        finished = []
+        for each in drawn:
+            each.frame.resolve()
+            if each.job.on_gpu and not each.job.direct:
+                prepared = each.job.prepared
+                each.frame.part = each.part
+                finished.append(self._encode(each.frame, prepared.scene.film.encoding, prepared.shaders, each.place))
+            else:
+                finished.append(each.frame)
+        _, height, width, channels = pictures.shape
+        pixels = np.empty((height, width, 4), dtype=pictures.dtype)
+        for each, frame in zip(drawn, finished, strict=True):
+            frame.read(pixels, each.part[:2])
+            pictures[each.number] = pixels[..., :channels]
 
     def layers(self, scene: Scene, *, dtype: DType = "float32", shading: Rate | None = None, tile: int | None = None) -> Layers:
         """Returns the picture of a scene with the layers that its film asks for (`aovs`). Arguments and errors as
@@ -217,7 +323,14 @@ class Renderer:
 
         return draw
 
-    def prepare(self, scene: Scene, shading: Rate | None, encoding: Encoding, part: Part | None = None) -> Prepared:
+    def prepare(
+        self,
+        scene: Scene,
+        shading: Rate | None,
+        encoding: Encoding,
+        part: Part | None = None,
+        assembly: Assembly | None = None,
+    ) -> Prepared:
         """Returns the scene ready to draw, from the cache if neither the scene nor a shader file has changed.
 
         The context must be current.
@@ -225,6 +338,7 @@ class Renderer:
         shading: optional; replaces the shading rate of every object.
         encoding: the encoding that the programs write.
         part: optional; the part of the scene's light, or the property of its surfaces, that is drawn.
+        assembly: optional; the assembly of the same scene for another encoding, if it is known already.
         Errors: SceneError, ShaderError.
         """
         self.context.check_open()
@@ -233,23 +347,32 @@ class Renderer:
         if prepared is None or prepared.scene is not scene or not self._is_current(prepared):
             prepared = self._seen_anew(scene, key)
             if prepared is None:
-                assembly = ready(scene, shading, part)
+                assembly = assembly or ready(scene, shading, part)
                 prepared = self._preparer.prepare(scene, assembly, encoding, self.current_shaders(), self.rewrite)
             self._prepared.put(key, prepared, prepared.size)
-        self._newest = key[1:], prepared
         return prepared
 
     def _seen_anew(self, scene: Scene, key: tuple[Any, ...]) -> Prepared | None:
-        """Returns the scene ready to draw if it differs from the newest prepared scene in its camera alone; else None.
+        """Returns the scene ready to draw if it differs from a prepared scene in its camera alone; else None.
 
         key: the scene's key in the cache.
         """
-        if self._newest is None or self._newest[0] != key[1:]:
-            return None
-        before = self._newest[1]
-        refined = any(instance.rate == "gouraud" and instance.quality.refine for instance in before.assembly.instances)
         # The assembly of a part of the light has other instances than the scene.
-        if key[3] is not None or refined or not self._is_current(before) or not scene.differs_in_camera(before.scene):
+        if key[3] is not None:
+            return None
+        for known, before in self._prepared.newest_first():
+            if known[1:] == key[1:] and scene.differs_in_camera(before.scene) and self._is_current(before):
+                return self._seen_from(before, scene)
+        return None
+
+    def _seen_from(self, before: Prepared, scene: Scene) -> Prepared | None:
+        """Returns a scene ready to draw that differs from a prepared one, which is current, in its camera alone.
+
+        The result is None where its programs may differ.
+        """
+        # A refined mesh, which depends on the view, belongs to one instance.
+        refined = any(call.plan.rate == "gouraud" and call.instance.quality.refine for call in before.calls)
+        if refined:
             return None
         assembly = seen_anew(before.assembly, scene)
         return None if assembly is None else self._preparer.seen_anew(before, scene, assembly)
@@ -262,7 +385,6 @@ class Renderer:
     def evict_unused(self) -> None:
         """Frees everything that is cached and that no picture has needed since the last call of `age`."""
         self._prepared.evict_unused()
-        self._newest = None
         self.resources.evict_unused()
         with self.context.gl:
             self.context.gl.gc()
@@ -282,44 +404,11 @@ class Renderer:
         clip: the matrix (4, 4) from positions relative to the eye to clip space.
         calls: optional; the draw calls to execute. Default: all of the scene.
         """
-        gl = self.context.gl
-        gl.enable_only(moderngl.DEPTH_TEST)
-        gl.depth_func = ">"
         viewer = rounded(prepared.assembly.view.toward_viewer)
-        # A program keeps its uniforms from call to call, so that they are set only when they change.
-        held: dict[int, dict[str, NDArray[np.float32]]] = {}
-        lit: dict[int, int] = {}
-        state: tuple[bool, ...] = ()
-        for call in prepared.calls if calls is None else calls:
-            program = call.program
-            values = held.get(id(program))
-            if values is None:
-                values = held[id(program)] = {}
-                program.write("u_clip_from_world", clip)
-                program.write("u_viewer", viewer)
-            if lit.get(id(program)) != id(call.lights):
-                lit[id(program)] = id(call.lights)
-                for name, value in call.lights.items():
-                    program.write(name, value)
-            for name, value in call.values.items():
-                if values.get(name) is not value:
-                    values[name] = value
-                    program.write(name, value)
-            for unit, (name, texture) in enumerate(call.samplers):
-                texture.use(unit)
-                program.set_integer(name, unit)
-            for binding, (key, buffer, count) in enumerate(call.pages):
-                buffer.bind_to_uniform_block(binding)
-                program.members[f"{key}_page"].binding = binding
-                program.set_integer(f"u_{key}_count", count)
-            wanted = (call.plan.alpha == "blend", call.added, not call.instance.back_faces, call.instance.mirrored)
-            if wanted != state:
-                state = wanted
-                self._set_state(*wanted)
-            call.vertices.render()
-        gl.fbo.depth_mask = True
+        Drawing(self.context, clip, viewer).draw(prepared.calls if calls is None else calls)
 
-    def _render(self, scene: Scene, dtype: DType, shading: Rate | None, tile: int | None) -> Image:
+    def _job(self, scene: Scene, dtype: DType, shading: Rate | None) -> _Job:
+        """Returns a picture that is ready to draw. The arguments are those of `render`."""
         film = scene.film
         transform = None
         if dtype == "uint8" and film.transformed:
@@ -332,23 +421,29 @@ class Renderer:
         prepared = self.prepare(scene, shading, film.encoding if direct else "linear")
         if direct and (prepared.blends or any(call.added for call in prepared.calls)):
             direct = False
-            prepared = self.prepare(scene, shading, "linear")
+            prepared = self.prepare(scene, shading, "linear", assembly=prepared.assembly)
         self.last_prepared = prepared
-        left, top, width, height = film.window
         on_gpu = dtype == "uint8" and len(sample_offsets) == 1 and transform is None
-        pixels = self.resources.pixels((height, width, 4), np.uint8 if on_gpu else np.float32)
-        self._fill(prepared, sample_offsets, direct, tile, pixels)
+        return _Job(prepared, sample_offsets, direct, on_gpu, dtype, transform)
+
+    def _picture(self, job: _Job, tile: int | None = None) -> Image:
+        """Draws a picture and returns it."""
+        scene = job.prepared.scene
+        film = scene.film
+        left, top, width, height = film.window
+        pixels = self.resources.pixels((height, width, 4), np.uint8 if job.on_gpu else np.float32)
+        self._fill(job.prepared, job.sample_offsets, job.direct, tile, pixels)
         image = Image(
             pixels[..., : len(film.background)],
-            film.encoding if on_gpu else "linear",
-            {"glshade:renderer": self._drawn_by} if on_gpu else self._attributes(prepared),
+            film.encoding if job.on_gpu else "linear",
+            {"glshade:renderer": self._drawn_by} if job.on_gpu else self._attributes(job.prepared),
             (left, top),
             film.size if film.crop else None,
-            prepared.assembly.calibration(scene),
+            job.prepared.assembly.calibration(scene),
         )
-        if on_gpu or dtype == "float32":
+        if job.on_gpu or job.dtype == "float32":
             return image
-        return transform(image) if transform else image.encoded(film.encoding)
+        return job.transform(image) if job.transform else image.encoded(film.encoding)
 
     def _fill(
         self, prepared: Prepared, sample_offsets: list[Offset], direct: bool, tile: int | None, out: NDArray[Any]
@@ -363,8 +458,7 @@ class Renderer:
         """
         film = prepared.scene.film
         left, top, *size = film.window
-        # With several samples per pixel, a frame takes several times the memory, so tiles are smaller.
-        side = min(tile or (TILE if film.samples == 1 else TILE // 2), self.context.largest_side)
+        side = self._side(film, tile)
         for piece, (x, y, w, h) in pieces(film, side):
             if [w, h] == size:
                 self._draw_piece(prepared, piece, (x, y, w, h), sample_offsets, direct, out)
@@ -378,19 +472,25 @@ class Renderer:
     ) -> None:
         """Fills `out` (h, w, 4) with the wanted box of the picture. The box is part of a piece, which may be larger."""
         film = prepared.scene.film
-        left, top, *size = piece
-        x, y, w, h = wanted
-        part = (x - left, y - top, w, h)
-        storage = "rgba8" if direct else prepared.linear_storage
-        frame = self.resources.frame((size[0], size[1]), storage, min(film.samples, self.context.gl.max_samples))
-        background = _background(film.background, film.encoding if direct else "linear")
-        whole = prepared.assembly.view.clip_from_world(self.context.zero_to_one)
+        # Frames in linear light, and those of several samples, take so long to clear, resolve and encode that it matters.
+        box = covered(prepared.assembly, film, wanted) if not direct or film.samples > 1 else None
+        if box is not None and box != wanted:
+            inner = np.empty((box[3], box[2], 4), dtype=out.dtype)
+            self._draw_box(prepared, piece, box, sample_offsets, direct, inner)
+            surrounded(inner, box, wanted, out)
+        else:
+            self._draw_box(prepared, piece, wanted, sample_offsets, direct, out)
+
+    def _draw_box(
+        self, prepared: Prepared, piece: Box, wanted: Box, sample_offsets: list[Offset], direct: bool, out: NDArray[Any]
+    ) -> None:
+        """Does what `_draw_piece` does, but draws every pixel of the wanted box."""
+        film = prepared.scene.film
+        frame, part = self._begun(prepared, piece, wanted, direct)
         # The sum is float64, so that the mean of equal numbers is exactly that number.
         total = np.zeros(out.shape) if len(sample_offsets) > 1 else None
-        for dx, dy in sample_offsets:
-            clip = rounded(window(whole, film.size, left + dx, top + dy, *size))
-            frame.begin(background, None if wanted == piece else part)
-            self.draw(prepared, clip)
+        for offset in sample_offsets:
+            self._draw_shifted(prepared, frame, piece, wanted, offset, direct)
             if out.dtype == np.uint8 and not direct:
                 self._encode(frame, film.encoding, prepared.shaders).readback(out, part[:2])
             elif total is None:
@@ -402,31 +502,37 @@ class Renderer:
         if total is not None:
             out[...] = total / len(sample_offsets)
 
-    def _set_state(self, blended: bool, added: bool, culled: bool, mirrored: bool) -> None:
-        """Sets face culling, blending and the depth test for a draw call.
+    def _side(self, film: Film, tile: int | None) -> int:
+        """Returns the largest side that is drawn in one piece [pixels]. tile: as for `render`."""
+        # With several samples per pixel, a frame takes several times the memory, so tiles are smaller.
+        return min(tile or (TILE if film.samples == 1 else TILE // 2), self.context.largest_side)
 
-        blended: whether the surface is blended over the pixels behind it.
-        added: whether the call draws a further page of lights.
-        culled: whether back faces are culled.
-        mirrored: whether the object's transform mirrors it, which reverses the winding of its triangles.
+    def _begun(self, prepared: Prepared, piece: Box, wanted: Box, direct: bool, number: int = 0) -> tuple[Frame, Box]:
+        """Returns the frame for a piece of a picture, and the wanted box in pixels of the frame.
+
+        number: as for `Resources.frame`.
         """
-        gl = self.context.gl
-        (gl.enable if culled else gl.disable)(moderngl.CULL_FACE)
-        # The picture is drawn upside down so that row 0 is the top, which turns counter-clockwise into clockwise.
-        gl.front_face = "ccw" if mirrored else "cw"
-        (gl.enable if blended or added else gl.disable)(moderngl.BLEND)
-        if blended or added:
-            one, rest = moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA
-            # A further page adds its light and leaves alpha as it is.
-            gl.blend_func = (one, one, moderngl.ZERO, one) if added else (one, rest, one, rest)  # type: ignore[assignment]
-        # Later pages of lights add to the fragments that the first page drew, so the depth test is "equal".
-        gl.depth_func = "==" if added and not blended else ">"
-        gl.fbo.depth_mask = not (blended or added)
+        left, top, width, height = piece
+        x, y, w, h = wanted
+        storage = "rgba8" if direct else prepared.linear_storage
+        samples = min(prepared.scene.film.samples, self.context.gl.max_samples)
+        return self.resources.frame((width, height), storage, samples, number), (x - left, y - top, w, h)
 
-    def _encode(self, frame: Frame, encoding: Encoding, shaders: Shaders) -> Frame:
-        """Returns an 8-bit frame with the encoded colours of a frame in linear light."""
+    def _draw_shifted(self, prepared: Prepared, frame: Frame, piece: Box, wanted: Box, offset: Offset, direct: bool) -> None:
+        """Draws the wanted box of a piece of a picture, shifted by an offset [pixels], into the piece's frame."""
+        film = prepared.scene.film
+        left, top, *size = piece
+        x, y, w, h = wanted
+        whole = prepared.assembly.view.clip_from_world(self.context.zero_to_one)
+        clip = rounded(window(whole, film.size, left + offset[0], top + offset[1], *size))
+        background = _background(film.background, film.encoding if direct else "linear")
+        frame.begin(background, None if wanted == piece else (x - left, y - top, w, h))
+        self.draw(prepared, clip)
+
+    def _encode(self, frame: Frame, encoding: Encoding, shaders: Shaders, number: int = 0) -> Frame:
+        """Returns an 8-bit frame with the encoded colours of a frame in linear light. number: as for `Resources.frame`."""
         texture = frame.resolve()
-        picture = self.resources.frame(frame.size, "rgba8", 1)
+        picture = self.resources.frame(frame.size, "rgba8", 1, number)
         source = encoder(encoding, shaders)
         if self.shaders is None and not shaders.is_current(source.files):
             source = encoder(encoding, current(self._folders))
@@ -455,6 +561,14 @@ class Renderer:
         return prepared.attributes
 
 
+def _check_choices(dtype: str, shading: str | None) -> None:
+    """Raises ValueError for a type of pixels or a shading rate that does not exist."""
+    for given, allowed in ((dtype, get_args(DType)), (shading, (None, *get_args(Rate)))):
+        if given not in allowed:
+            raise ValueError(f"{given!r} is none of {', '.join(map(repr, allowed))}")
+
+
+@lru_cache
 def _background(colour: tuple[float, ...], encoding: Encoding) -> tuple[float, float, float, float]:
     """Returns the background as red, green, blue and alpha, premultiplied and encoded for the frame."""
     alpha = colour[3] if len(colour) == 4 else 1.0

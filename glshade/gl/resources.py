@@ -14,20 +14,23 @@ from numpy.typing import NDArray
 from glshade.gl.context import Context
 from glshade.gl.frame import FORMATS, Frame, Storage
 from glshade.gl.program import Program
+from glshade.gl.tables import TEXEL, upload_table
 from glshade.gl.textures import upload
 from glshade.gl.vertices import Vertices
 from glshade.glsl.flat_inputs import with_flat_inputs
+from glshade.glsl.instancing import with_instances
 from glshade.glsl.source import Source
 from glshade.lru import Lru
 from glshade.textures.pixel_array import PixelArray
 from glshade.textures.texels import Texels
+from glshade.textures.volume import Volume
 
 # A program takes about this much memory [bytes]. llvmpipe keeps the machine code of each of its variants: 0.7 MiB were measured
 # with one light, and 3.6 MiB with eight.
 PROGRAM = 2 << 20
 # The limit of the cache of programs [bytes].
 PROGRAMS = 192 << 20
-# The limit of the cache of textures [bytes]. A texture of 1024 x 1024 texels takes 21 MiB with its mipmaps.
+# The limit of the cache of textures [bytes]. An 8-bit colour texture of 1024 x 1024 texels takes 5.3 MiB with its mipmaps.
 TEXTURES = 96 << 20
 # The limit of the cache of frames [bytes].
 FRAMES = 256 << 20
@@ -47,24 +50,26 @@ class Resources:
     def __init__(self, context: Context) -> None:
         self.context = context
         self.vertices = Vertices(context)
-        self._programs: Lru[tuple[tuple[str, ...], bool], Program] = Lru(PROGRAMS)
-        self._textures: Lru[Hashable, moderngl.Texture] = Lru(TEXTURES)
-        self._frames: Lru[tuple[tuple[int, int], Storage, int], Frame] = Lru(FRAMES, spare=FRAMES_IN_USE)
+        self._programs: Lru[tuple[tuple[str, ...], bool, tuple[str, ...]], Program] = Lru(PROGRAMS)
+        self._textures: Lru[Hashable, moderngl.Texture | moderngl.Texture3D] = Lru(TEXTURES)
+        self._frames: Lru[tuple[tuple[int, int], Storage, int, int], Frame] = Lru(FRAMES, spare=FRAMES_IN_USE)
         self._pixels: list[NDArray[Any]] = []
 
-    def program(self, source: Source, flat: bool = False) -> Program:
+    def program(self, source: Source, flat: bool = False, varying: tuple[str, ...] = ()) -> Program:
         """Returns the compiled program of a source. Sources that differ only in comments share one program.
 
         source: the text of the program.
         flat: whether the fragment stage gets flat inputs in place of uniforms; the pictures are the same.
+        varying: the uniforms that become attributes of the instances; empty for a program that draws one instance.
         Errors: ShaderError.
         """
 
         def make() -> Program:
-            written = with_flat_inputs(source, self.context.passed_vectors) if flat else source
+            written = with_instances(source, varying) if varying else source
+            written = with_flat_inputs(written, self.context.passed_vectors) if flat else written
             return Program(self.context, written)
 
-        return self._programs.find((source.code, flat), make, lambda _: PROGRAM)
+        return self._programs.find((source.code, flat, varying), make, lambda _: PROGRAM)
 
     def age(self) -> None:
         """Marks all programs, textures and frames as unused. Those that later pictures need count as used again."""
@@ -80,10 +85,13 @@ class Resources:
     def _caches(self) -> tuple[Lru[Any, Any], ...]:
         return self._programs, self._textures, self._frames
 
-    def texture(self, texels: Texels) -> moderngl.Texture:
-        """Returns the texture of a picture. It is loaded again if the file has changed, and evicted together with a picture in
-        memory. Errors: AssetError.
+    def texture(self, texels: Texels | Volume) -> moderngl.Texture | moderngl.Texture3D:
+        """Returns the texture of a picture or of a table. A picture is loaded again if the file has changed, and evicted
+        together with a picture in memory. Errors: AssetError, SceneError.
         """
+        if isinstance(texels, Volume):
+            table = texels
+            return self._textures.find(("table", table.digest), lambda: upload_table(self.context, table), texture_size)
         key = texels.key
 
         def make() -> moderngl.Texture:
@@ -94,20 +102,16 @@ class Resources:
 
         return self._textures.find(key, make, texture_size)
 
-    def frame(self, size: tuple[int, int], storage: Storage, samples: int) -> Frame:
+    def frame(self, size: tuple[int, int], storage: Storage, samples: int, number: int = 0) -> Frame:
         """Returns a frame to draw into, which may hold an earlier picture.
 
         size: width and height [pixels].
         storage: the format of the colours.
         samples: the number of samples per pixel.
+        number: tells apart several frames of one kind that are used together.
         """
-
-        def bytes_of(_: Frame) -> int:
-            channels = FORMATS[storage][1]
-            # Every sample has colours and depth of 4 bytes per number; several samples are resolved to another buffer.
-            return size[0] * size[1] * (samples * (channels * 4 + 4) + (channels * 4 if samples > 1 else 0))
-
-        return self._frames.find((size, storage, samples), lambda: Frame(self.context, size, storage, samples), bytes_of)
+        key = size, storage, samples, number
+        return self._frames.find(key, lambda: Frame(self.context, size, storage, samples), frame_size)
 
     def pixels(self, shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
         """Returns an uninitialised array for a picture. An earlier array is reused if no image refers to it, because a new one
@@ -119,6 +123,14 @@ class Resources:
         return self._pixels[-1]
 
 
+def frame_size(frame: Frame) -> int:
+    """Returns the approximate size of a frame [bytes]."""
+    width, height = frame.size
+    channels, samples = FORMATS[frame.storage][1], frame.samples
+    # Every sample has colours and depth of 4 bytes per number; several samples are resolved to another buffer.
+    return width * height * (samples * (channels * 4 + 4) + (channels * 4 if samples > 1 else 0))
+
+
 def _drop(cache: weakref.ref[Lru[Hashable, Any]], key: Hashable) -> None:
     """Removes a key from a cache that may be gone already."""
     found = cache()
@@ -126,12 +138,12 @@ def _drop(cache: weakref.ref[Lru[Hashable, Any]], key: Hashable) -> None:
         found.drop(key)
 
 
-def texture_size(texture: moderngl.Texture) -> int:
-    """Returns the approximate size of a float32 texture with its mipmaps [bytes]."""
-    width, height = texture.size
-    numbers: int = width * height * texture.components
-    # A number takes 4 bytes, and the mipmaps add a third.
-    return numbers * 4 * 4 // 3
+def texture_size(texture: moderngl.Texture | moderngl.Texture3D) -> int:
+    """Returns the size of a texture with its mipmaps [bytes]."""
+    if isinstance(texture, moderngl.Texture3D):
+        return texture.width * texture.height * texture.depth * TEXEL
+    # glshade.gl.textures leaves the size there.
+    return int(texture.extra)
 
 
 def _references(arrays: list[NDArray[Any]]) -> list[int]:

@@ -1,4 +1,4 @@
-"""Definitions: the functions, structs and constants of a stage's text, and which of them main() reaches.
+"""Definitions: the functions, structs, constants and tables of a stage's text, and which of them main() reaches.
 
 A definition is recognised where it starts in the first column of a line, and where its last line holds nothing else. Any other
 text, such as one with a syntax error, counts as used, so that the driver sees all of it and reports its errors.
@@ -9,21 +9,25 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, get_args
 
 _HEAD = re.compile(
-    r"(?:const \w+ (?P<const>\w+) =)|(?:struct (?P<struct>\w+) \{)|(?:(?!layout\b)\w+ (?P<function>\w+)\((?P<rest>.*))"
+    r"(?:const \w+ (?P<const>\w+) =)|(?:struct (?P<struct>\w+) \{)|(?:uniform sampler3D (?P<table>\w+))|"
+    r"(?:(?!layout\b)\w+ (?P<function>\w+)\((?P<rest>.*))"
 )
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 _CALL = re.compile(r"\b(\w+)\(")
 _WORD = re.compile(r"[A-Za-z_]\w*")
+
+Kind = Literal["const", "struct", "table", "function"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 
 
 @dataclass(frozen=True)
 class Definition:
     """One definition of a stage's text.
 
-    kind: function, struct or const.
+    kind: function, struct, const, or table for the sampler of a model's table.
     name: the name that it defines.
     arguments: the number of arguments of a function, 0 otherwise.
     first: the index of its first line, counting the comment directly above it.
@@ -31,7 +35,7 @@ class Definition:
     code: its text without comments.
     """
 
-    kind: Literal["function", "struct", "const"]
+    kind: Kind
     name: str
     arguments: int
     first: int
@@ -55,8 +59,7 @@ def find_definitions(lines: Sequence[str]) -> list[Definition]:
         if head is None or end is None:
             at += 1
             continue
-        kind: Literal["function", "struct", "const"]
-        kind = "const" if head["const"] else "struct" if head["struct"] else "function"
+        kind: Kind = next(kind for kind in KINDS if head[kind])
         first = at
         while first > 0 and lines[first - 1].startswith("//"):
             first -= 1

@@ -97,7 +97,8 @@ def explanation_of(scene: Scene, shading: Rate | None = None, shaders: Shaders |
     assembly, plan = ready(scene, shading), explain(scene, shading)
     why: list[dict[str, str]] = [{} for _ in plan.programs]
     draws: list[dict[str, None]] = [{} for _ in plan.programs]
-    for instance, (name, index) in zip(assembly.instances, plan.draws, strict=True):
+    parts = (part for instance in assembly.instances for part in instance.parts)
+    for instance, (name, index) in zip(parts, plan.draws, strict=True):
         draws[index][name] = None
         for feature, reason in reasons(plan.programs[index], instance, assembly):
             why[index].setdefault(feature, reason)

@@ -35,7 +35,16 @@ def with_flat_inputs(source: Source, room: int) -> Source:
         if uniform.storage == "uniform" and uniform.type in TYPES and max(uniform.count, 1) <= room:
             room -= max(uniform.count, 1)
             handed[line] = uniform
-    if not handed:
+    return handed_over(source, handed)
+
+
+def handed_over(source: Source, handed: dict[int, Declaration]) -> Source:
+    """Returns the program with some uniforms of its fragment stage turned into flat inputs.
+
+    source: the program.
+    handed: index of the line in the fragment stage -> declaration of the uniform.
+    """
+    if source.fragment is None or not handed:
         return source
     return Source(_handing_on(source.vertex, list(handed.values())), _receiving(source.fragment, handed))
 

@@ -456,7 +456,7 @@ def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
     code.join(_emission_and_occlusion(plan, at))
     if not plan.lights:
         # Without any light the surface is drawn black, or shows its emission: it still covers what lies behind it.
-        return code.add(f"\nvec3 radiance(float side) {{\n{body}    return {ambient};\n}}\n")
+        return code.add(f"\nvec3 radiance(float side) {{\n{body}    return {_weighted(plan, ambient, code)};\n}}\n")
     code.join(_frame(plan, at))
     body += "    Frame f = frame(side);\n"
     if plan.directed:
@@ -466,7 +466,19 @@ def _shading(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:
     for group in plan.lights:
         code.join(_lights(group))
     body += f"    vec3 c = {ambient};\n" + "".join(_loop(group, occluded) for group in plan.lights)
-    return code.add(f"\nvec3 radiance(float side) {{\n{body}    return c;\n}}\n").join(_faces_viewer(plan, at))
+    result = _weighted(plan, "c", code)
+    return code.add(f"\nvec3 radiance(float side) {{\n{body}    return {result};\n}}\n").join(_faces_viewer(plan, at))
+
+
+def _weighted(plan: ProgramPlan, light: str, code: Code) -> str:
+    """Returns the expression of the light in RGB, and adds the uniform that it reads to the code.
+
+    light: the expression of the light, whose channels are bands of wavelengths if the plan says so.
+    """
+    if not plan.weighted:
+        return light
+    code.uniform("mat3", "u_rgb_from_bands")
+    return f"u_rgb_from_bands * ({light})"
 
 
 def _faces_viewer(plan: ProgramPlan, at: _Interpolated | _AtVertex) -> Code:

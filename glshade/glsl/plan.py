@@ -34,7 +34,7 @@ def is_grey(colour: tuple[float, float, float]) -> bool:
 
 def is_white(light: Light) -> bool:
     """Returns whether the light's colour is grey, so that its intensity is one number."""
-    return is_grey(light.colour)
+    return is_grey(light.rgb)
 
 
 def kind(light: Light) -> tuple[str, Falloff]:
@@ -113,6 +113,7 @@ class ProgramPlan:
     placed: the samplers of the textures that are read at coordinates which a matrix makes from those of the mesh.
     scaled: whether values that are interpolated at the centroid may come with a wrong factor, which the fragment stage divides
         out.
+    weighted: whether the three channels are bands of wavelengths, which a matrix turns into RGB in the end.
     """
 
     rate: Rate
@@ -141,6 +142,7 @@ class ProgramPlan:
     added: tuple[str, ...] = ()
     placed: tuple[str, ...] = ()
     scaled: bool = False
+    weighted: bool = False
 
     @property
     def oriented(self) -> bool:
@@ -227,6 +229,7 @@ class ProgramPlan:
             "vertex colours": self.vertex_colours,
             "normals not normalised": not self.normalise,
             "fast arithmetic": self.arithmetic == "fast",
+            "bands of wavelengths": self.weighted,
             "both sides": self.both_sides,
             f"alpha {self.alpha}": self.alpha != "opaque",
         }
@@ -253,7 +256,7 @@ class Plan:
     def __str__(self) -> str:
         lines = []
         for index, program in enumerate(self.programs):
-            names = [name for name, drawn_with in self.draws if drawn_with == index]
+            names = list(dict.fromkeys(name for name, drawn_with in self.draws if drawn_with == index))
             listed = ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
             lines.append(f"program {index}: {program}\n  draws {listed}")
         return "\n".join([*lines, *(f"{feature}: because of {reason}" for feature, reason in self.reasons)])

@@ -110,8 +110,29 @@ def plan_instance(instance: Instance, assembly: Assembly, encoding: Literal["lin
         arithmetic=(instance.quality.arithmetic if groups else None) or "stable",
         emission=emission,
         occlusion=occlusion,
+        weighted=instance.weights is not None,
     )
     return replace(plan, placed=placed(plan, material), added=added(plan, material))
+
+
+def plans(assembly: Assembly, encoding: Literal["linear", "srgb"], scaled: bool = False) -> list[ProgramPlan]:
+    """Returns the plan of every instance of an assembly, none of which has shares. Equal plans are one object.
+
+    scaled: as in ProgramPlan.
+    """
+    known: dict[tuple[Any, ...], ProgramPlan] = {}
+    equal: dict[ProgramPlan, ProgramPlan] = {}
+    result = []
+    for each in assembly.instances:
+        # All that a plan depends on. Identities stand for values that take long to compare.
+        weighted, quality = each.weights is not None, id(each.quality)
+        key = id(each.material), each.lights, each.rate, each.back_faces, each.vertex_colours, quality, each.shows, weighted
+        if key not in known:
+            made = plan_instance(each, assembly, encoding)
+            made = replace(made, scaled=True) if scaled else made
+            known[key] = equal.setdefault(made, made)
+        result.append(known[key])
+    return result
 
 
 def _read_as(material: Brdf, name: str) -> tuple[Texels, Placement]:
@@ -221,7 +242,7 @@ def explain(scene: Scene, shading: Rate | None = None) -> Plan:
     film, storage = scene.film, scene.quality.storage
     # Averaging samples, blending and adding pages of lights have to happen in linear light, before the encoding.
     direct = film.direct and storage in (None, "auto")
-    direct &= not any(i.material.alpha_mode == "blend" or _has_pages(i, assembly) for i in assembly.instances)
+    direct &= not any(i.material.alpha_mode == "blend" or i.shares or _has_pages(i, assembly) for i in assembly.instances)
     return plan(assembly, film.encoding if direct else "linear")
 
 
@@ -238,8 +259,8 @@ def plan(assembly: Assembly, encoding: Literal["linear", "srgb"]) -> Plan:
     programs: dict[ProgramPlan, int] = {}
     draws: list[tuple[str, int]] = []
     why: dict[str, str] = {}
-    for instance in assembly.instances:
-        program = plan_instance(instance, assembly, encoding)
+    whole = replace(assembly, instances=tuple(part for instance in assembly.instances for part in instance.parts))
+    for instance, program in zip(whole.instances, plans(whole, encoding), strict=True):
         draws.append((instance.name, programs.setdefault(program, len(programs))))
         for feature, reason in reasons(program, instance, assembly):
             why.setdefault(feature, reason)

@@ -18,8 +18,11 @@ def reasons(program: ProgramPlan, instance: Instance, assembly: Assembly) -> Ite
         return assembly.lights[index].name or f"lights[{index}]"
 
     yield f"brdf {program.brdf} per {PER[program.rate]}", name
+    yield from instance.said
     for part in program.parts:
         yield f"{program.brdf}'s {part}", name
+    if program.directed:
+        yield from ((note.removesuffix("."), name) for note in material.notes())
     for parameter in program.textured:
         yield f"texture of {parameter}", name
     if program.emission in ("uniform", "grey"):

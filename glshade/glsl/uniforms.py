@@ -6,6 +6,7 @@ values, so that the two renderers share their inputs and nothing else.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,14 +22,16 @@ from glshade.assembly.values import (
     emitted,
     emitted_beside,
     light_values,
+    normal_matrices,
     normal_matrix,
 )
-from glshade.brdfs import Brdf
+from glshade.brdfs import Brdf, numbers
 from glshade.brdfs import parameter_values as parameter_values
 from glshade.glsl.plan import LightGroup, ProgramPlan, channel
 from glshade.lights import LIGHTS, Light
 from glshade.textures.texels import Texels, placement_of, texels_of
 from glshade.textures.texture import UNPLACED
+from glshade.textures.volume import Volume
 
 Array = NDArray[np.float64]
 Values = dict[str, NDArray[np.float32]]
@@ -51,9 +54,48 @@ def object_uniforms(plan: ProgramPlan, instance: Instance, eye: Array) -> Values
         values["u_handedness"] = -1.0 if instance.mirrored else 1.0
     if plan.shows == "depth":
         values["u_number"] = instance.number
-    values.update(material_uniforms(plan, instance.material))
+    values.update(_of_surface(plan, instance))
+    return _rounded(values)
+
+
+def surface_uniforms(plan: ProgramPlan, instance: Instance, assembly: Assembly, exposure: float) -> Values:
+    """Returns the uniforms of an object that do not depend on its transform, apart from whether this mirrors the object.
+
+    exposure: the film's exposure [stops].
+    """
+    sign = {"u_handedness": -1.0 if instance.mirrored else 1.0} if plan.tangents else {}
+    values = _rounded(sign | _of_surface(plan, instance))
+    return values | exposed_uniforms(plan, instance, assembly, exposure)
+
+
+def _of_surface(plan: ProgramPlan, instance: Instance) -> dict[str, Any]:
+    """Returns the uniforms of an object's material, and the matrix that turns its bands of wavelengths into RGB."""
+    bands = {"u_rgb_from_bands": instance.weights} if plan.weighted else {}
+    return bands | material_uniforms(plan, instance.material)
+
+
+def placement_uniforms(plan: ProgramPlan, instances: Sequence[Instance], eye: Array) -> Values:
+    """Returns the uniforms that differ with the transforms of N objects, (N, ...): to the bit those of `object_uniforms`.
+
+    plan: the plan of the program.
+    instances: the objects.
+    eye: the position (3,) of the viewer in the world; the placement is relative to it.
+    """
+    relative = np.array([instance.world_from_object for instance in instances])
+    linear = relative[:, :3, :3].copy()
+    relative[:, :3, 3] -= eye
+    values: dict[str, Any] = {"u_world_from_object": relative}
+    if plan.oriented:
+        values["u_normal_from_object"] = normal_matrices(linear)
+    if plan.shows == "depth":
+        values["u_number"] = [instance.number for instance in instances]
+    return _rounded(values)
+
+
+def _rounded(values: dict[str, Any]) -> Values:
+    """Returns the values rounded to float32. Those beyond its range become infinite, which the caller reports."""
     dtype = precision()
-    with np.errstate(over="ignore"):  # Values beyond float32 become infinite; the caller reports them.
+    with np.errstate(over="ignore"):
         return {name: np.asarray(value, dtype=np.float64).astype(dtype) for name, value in values.items()}
 
 
@@ -90,9 +132,24 @@ def material_uniforms(plan: ProgramPlan, material: Any) -> dict[str, Any]:
     return values
 
 
-def textures(plan: ProgramPlan, material: Brdf) -> dict[str, Texels]:
-    """Sampler name -> texels, for every texture that the program reads."""
-    return {sampler: texels_of(material, key) for sampler, key in pictures(plan, material).items()}
+def textures(plan: ProgramPlan, material: Brdf) -> dict[str, Texels | Volume]:
+    """Sampler name -> texels or table, for every texture that the program reads. Errors: AssetError for a table."""
+    texels = {sampler: texels_of(material, key) for sampler, key in pictures(plan, material).items()}
+    return {**texels, **tables(plan, material)}
+
+
+def model_inputs(brdf: Brdf) -> dict[str, NDArray[np.float32] | Volume]:
+    """Returns the uniforms of a program that evaluates one model, by name: the parameters, rounded to float32, and the tables.
+
+    Errors: ValueError for a parameter that is a texture; AssetError for a table whose file cannot be read.
+    """
+    found: dict[str, NDArray[np.float32] | Volume] = {**numbers(brdf), **brdf.volumes()}
+    return {f"u_{name}": value for name, value in found.items()}
+
+
+def tables(plan: ProgramPlan, material: Brdf) -> dict[str, Volume]:
+    """Sampler name -> table, for every table that the program reads. Errors: AssetError."""
+    return {f"u_{name}": volume for name, volume in material.volumes().items()} if plan.directed else {}
 
 
 def pictures(plan: ProgramPlan, material: Brdf) -> dict[str, str]:

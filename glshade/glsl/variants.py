@@ -53,6 +53,7 @@ def count_variants(scene: Scene, assembly: Assembly, plan: Plan, compiled: int) 
     kinds = {kind(light) for light in assembly.lights if not light.ignores_normal}
     encoding = plan.programs[0].encoding
     written = {
+        # Spectra do not choose among programs: the shares of an instance have the same written material.
         plan_instance(replace(instance, material=_written(scene, instance)), assembly, encoding)
         for instance in assembly.instances
     }
@@ -66,10 +67,13 @@ def count_variants(scene: Scene, assembly: Assembly, plan: Plan, compiled: int) 
 
 
 def _written(scene: Scene, instance: Instance) -> Brdf:
-    """Returns the material of an instance as the scene file gives it. A material from a mesh file is taken as it is drawn."""
+    """Returns the material of an instance as the scene file gives it, with RGB colours in place of spectra.
+
+    A material from a mesh file is taken as it is drawn.
+    """
     given = scene.objects[instance.number].material
     material = scene.materials[given] if isinstance(given, str) else given
-    return instance.quality.material(material) if material is not None else instance.material
+    return instance.quality.material(material).in_rgb() if material is not None else instance.material
 
 
 def _light_counts(kinds: int) -> int:

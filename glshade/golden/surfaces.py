@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 
 from glshade.assembly.assembly import Assembly
 from glshade.assembly.values import ambient_intensity
-from glshade.radiance.draw import Draw, placed, wide
+from glshade.radiance.draw import Draw, Shared, placed, wide
 from glshade.radiance.readying import ready
+from glshade.reference.division import by_draw
 from glshade.reference.inputs import Inputs, prepare
 from glshade.reference.raster import Fragments, rasterise, resolve
-from glshade.reference.shade import AT_CENTRE, by_draw, is_there, shade_fragments
+from glshade.reference.shade import AT_CENTRE, is_there, shade_fragments
 from glshade.scene.scene import Scene
 
 Array = NDArray[Any]
@@ -132,7 +133,7 @@ class Surfaces:
             draw, at = self.inputs.draws[number], self.place[which]
             shiny = self._specular(draw)
             if draw.instance.material.emits:
-                every[lights, at] = shade(self.inputs, number, replace(draw, lamps=(), surrounds=(), ambient=np.zeros(3)), part)
+                every[lights, at] = shade(self.inputs, number, _unlit(draw), part)
             for light in draw.instance.lights:
                 alone = self._lit_by(draw, light)
                 every[light, at] = shade(self.inputs, number, alone, part)
@@ -143,6 +144,10 @@ class Surfaces:
     def _lit_by(self, draw: Draw, light: int) -> Draw:
         """Returns a draw with one of its lights only, an index in the assembly's lights, and without emission."""
         kinds, dark = self.assembly.lights, np.zeros(3)
+        if draw.shares:
+            shares = tuple(self._lit_by(share, light) for share in draw.shares if light in share.instance.lights)
+            # Without any share, the draw is dark.
+            return replace(draw, shares=shares or (replace(_unlit(draw), emission=dark),))
         draw = replace(draw, emission=dark, added={**draw.added, "emission": dark})
         if kinds[light].ignores_normal:
             ambient = wide(ambient_intensity(self.assembly, (light,), self.scene.film.exposure))
@@ -159,16 +164,23 @@ class Surfaces:
 
     def _specular(self, draw: Draw) -> Draw | None:
         """Returns a draw without its diffuse lobes; None where nothing is left."""
+        pairs = [(share, share.material.specular_part()) for share in draw.instance.shares]
+        shares = [replace(share, material=shiny) for share, shiny in pairs if shiny is not None]
         material = draw.instance.material.specular_part()
-        if material is None:
+        if material is None or (draw.instance.shares and not shares):
             return None
-        instance = replace(draw.instance, material=material)
-        return placed(self.scene, self.assembly, instance, draw.clip_from_world, {})
+        instance = replace(draw.instance, material=material, shares=tuple(shares))
+        return placed(self.scene, self.assembly, instance, draw.clip_from_world, Shared())
 
     def _by_draw(self) -> Iterator[tuple[int, Any, Fragments]]:
         """Yields (index of a draw, indices of its fragments among those that are shown, these fragments)."""
         for draw, which, part in by_draw(self.inputs, self.shown):
             yield self.inputs.draws.index(draw), which, part
+
+
+def _unlit(draw: Draw) -> Draw:
+    """Returns a draw without its lights, which shows what it emits. Of its shares, the first one emits."""
+    return replace(draw.shares[0] if draw.shares else draw, lamps=(), surrounds=(), ambient=np.zeros(3))
 
 
 def shade(inputs: Inputs, number: int, draw: Draw, fragments: Fragments) -> Array:

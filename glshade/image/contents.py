@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 class PictureContents:
     """The numbers and texts of one picture file.
 
-    pixels: (H, W, C), row 0 at the top. A file is written from uint8 or float32. Reading gives float32: integers are divided by
-        the largest value of their type, floats stay as they are.
+    pixels: (H, W, C) uint8 or float32, row 0 at the top. Reading gives 8-bit codes as they are, larger integers divided by the
+        largest value of their type, and floats as they are.
     encoding: "srgb", "linear", or the colour interop id of another colour space.
     premultiplied: True where the colours are multiplied by alpha.
     channels: optional names of the C channels; by default R, G, B, A.
@@ -33,6 +33,11 @@ class PictureContents:
     matrices: Mapping[str, NDArray[Any]] = field(default_factory=dict)
     corner: tuple[int, int] = (0, 0)
     whole: tuple[int, int] | None = None
+
+    @property
+    def has_alpha(self) -> bool:
+        """Whether the last channel is alpha: of two or four channels, it is."""
+        return self.pixels.shape[2] in (2, 4)
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,11 +62,15 @@ def read(path: str | Path, encoding: Encoding = "auto") -> tuple[NDArray[np.floa
     encoding: the encoding of the file's colours; "auto" takes integers as sRGB-encoded and floats as linear.
     Errors: AssetError.
     """
+    return for_texture(read_contents(path), encoding)
+
+
+def read_contents(path: str | Path) -> PictureContents:
+    """Returns the pixels of a picture file: 8-bit codes as they are stored, everything else as float32. Errors: AssetError."""
     try:
-        contents = _format_to_read(path).read(Path(path))
+        return _format_to_read(path).read(Path(path))
     except OSError as error:
         raise _unreadable(path, error) from None
-    return for_texture(contents, encoding)
 
 
 def for_texture(contents: PictureContents, encoding: Encoding) -> tuple[NDArray[np.float32], bool]:
@@ -75,9 +79,11 @@ def for_texture(contents: PictureContents, encoding: Encoding) -> tuple[NDArray[
 
     from glshade.image.srgb import srgb_to_linear
 
-    pixels = contents.pixels
+    pixels, has_alpha = contents.pixels, contents.has_alpha
+    if pixels.dtype == np.uint8:
+        # OpenImageIO multiplies by the rounded reciprocal, too.
+        pixels = pixels * np.float32(1 / 255)
     count = pixels.shape[2]
-    has_alpha = count in (2, 4)
     colour = pixels[..., : count - has_alpha]
     if encoding == "srgb" or (encoding == "auto" and contents.encoding == "srgb"):
         colour = srgb_to_linear(colour)

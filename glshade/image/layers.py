@@ -34,7 +34,11 @@ AOVS = (
     "semantic_id",
     "mask",
     "cryptomatte",
+    "spectrum",
 )
+# The start of the names of a spectrum's channels, and the attributes of their file (Fichet, Pacanowski and Wilkie 2021).
+SPECTRAL = "S0."
+SPECTRAL_ATTRIBUTES = {"spectralLayoutVersion": "1.0", "emissiveUnits": "W.m^-2.sr^-1"}
 # The channel letters of layers that are not colours. Compositing programs expect Z for a depth, XYZ for a vector and UV for
 # texture coordinates; I for an index is Mitsuba's.
 CHANNELS = {
@@ -73,7 +77,7 @@ class Layers:
     def channels(self) -> tuple[str, ...]:
         """The names of the layers' channels as an OpenEXR file has them, such as `normal.X`."""
         return tuple(
-            f"{name}.{channel}"
+            name if name.startswith(SPECTRAL) else f"{name}.{channel}"
             for name, array in self.arrays.items()
             for channel in CHANNELS.get(name, "RGBA")[: array.shape[2]]
         )
@@ -122,6 +126,16 @@ class Layers:
             whole=picture.whole,
         )
         write(path, contents)
+
+
+def spectral_name(wavelength: float) -> str:
+    """Returns the name of the channel of a wavelength [nm], such as `S0.550,000000nm`: a dot would separate layers."""
+    return SPECTRAL + f"{wavelength:.6f}nm".replace(".", ",")
+
+
+def wavelength_of(name: str) -> float:
+    """Returns the wavelength [nm] in a name of `spectral_name`."""
+    return float(name.removeprefix(SPECTRAL).removesuffix("nm").replace(",", "."))
 
 
 def names_attribute(names: list[str]) -> str:

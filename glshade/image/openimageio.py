@@ -68,19 +68,21 @@ def _encode(output: Any, path: str, spec: oiio.ImageSpec, pixels: NDArray[Any]) 
 
 
 def read(path: Path) -> PictureContents:
-    """Returns the pixels of the first part of a picture file, at its largest size: (H, W, C) float32.
+    """Returns the pixels of the first part of a picture file, at its largest size: (H, W, C) uint8 for 8-bit codes, or float32.
 
     Integers count as sRGB-encoded, floats as linear. Errors: OSError, with the reason as its text.
     """
     source = _opened(path, _keep_straight_alpha())
     spec = source.spec()
-    pixels = source.read_image(oiio.FLOAT)
+    # A file whose channels differ in type lists their types.
+    codes = str(spec.format) == "uint8" and not spec.channelformats
+    pixels = source.read_image(oiio.UINT8 if codes else oiio.FLOAT)
     message = _error(source)
     source.close()
     if pixels is None or message:
         raise OSError(message or "no pixels")
     return PictureContents(
-        np.asarray(pixels, dtype=np.float32).reshape(spec.height, spec.width, spec.nchannels),
+        np.asarray(pixels, dtype=np.uint8 if codes else np.float32).reshape(spec.height, spec.width, spec.nchannels),
         encoding="linear" if str(spec.format) in {"float", "half", "double"} else "srgb",
         premultiplied=not spec.get_int_attribute("oiio:UnassociatedAlpha"),
     )

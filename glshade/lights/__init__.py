@@ -12,11 +12,12 @@ from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
+from pydantic import Discriminator, Field, Tag
 
 from glshade.arrays import unit_and_length
 from glshade.document import Document, Finite, Triple
 from glshade.found import Found
+from glshade.optics.spectra import Spectrum, is_spectrum
 
 Array = NDArray[np.float64]
 
@@ -42,12 +43,19 @@ FALLOFFS: Mapping[Falloff, FalloffLaw] = {
 }
 
 
+# The colour of a light: three numbers (one number stands for three equal ones) or a spectrum.
+LightColour = Annotated[
+    Annotated[Triple, Tag("<value>")] | Annotated[Spectrum, Tag("<spectrum-table>")],
+    Discriminator(lambda value: "<spectrum-table>" if is_spectrum(value) or isinstance(value, Mapping) else "<value>"),
+]
+
+
 class Light(Document):
     """The keys that every light has."""
 
     type: str
     name: str | None = Field(None, description="name of the light, for messages and dotted keys")
-    colour: Triple = Field((1.0, 1.0, 1.0), description="colour of the light, linear Rec. 709")
+    colour: LightColour = Field((1.0, 1.0, 1.0), description="colour of the light, linear Rec. 709, or its spectrum")
     intensity: Finite = Field(1.0, description="multiplies the colour; negative light takes light away")
     only: tuple[str, ...] | None = Field(None, description="names of the only objects that it lights; left out: all objects")
 
@@ -60,7 +68,12 @@ class Light(Document):
     @property
     def is_negative(self) -> bool:
         """Whether the light takes light away in at least one channel."""
-        return min(c * self.intensity for c in self.colour) < 0
+        return min(c * self.intensity for c in self.rgb) < 0
+
+    @property
+    def rgb(self) -> tuple[float, float, float]:
+        """The colour, linear Rec. 709. Errors: AssetError for a spectrum that cannot be read."""
+        return self.colour.colour(lit=False) if isinstance(self.colour, Spectrum) else self.colour
 
     @classmethod
     def fields(cls) -> dict[str, str]:
@@ -80,7 +93,7 @@ class Light(Document):
 
         eye: the origin of camera-relative space (3,), which positions are made relative to [scene units].
         """
-        return {"intensity": np.multiply(self.colour, self.intensity)}
+        return {"intensity": np.multiply(self.rgb, self.intensity)}
 
     @staticmethod
     def illuminate(light: Any, where: Array) -> Any:

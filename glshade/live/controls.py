@@ -11,6 +11,7 @@ from pydantic.fields import FieldInfo
 
 from glshade.brdfs import BRDFS, EMISSION, Brdf
 from glshade.document import Document
+from glshade.optics.spectra import Spectrum
 from glshade.presets import PRESETS
 from glshade.scene.object import Object
 from glshade.scene.override import dotted
@@ -114,6 +115,8 @@ def _parameters(key: str, material: Brdf) -> Iterator[Table]:
             factor = _named(f"{key}.{name}.factor", f"{name} (factor)", "colour", list(value.factor), declared.description)
             yield {**factor, "usual": [0.0, 1.0], "bounds": [None, None], "step": 0.01}
             continue
+        if isinstance(value, Spectrum):
+            continue
         kind = "colour" if material.is_colour(name) else "number"
         field = _named(f"{key}.{name}", name, kind, _plain(value), declared.description)
         yield {**field, **_range(declared.usual, (declared.low, declared.high)), "unit": declared.unit}
@@ -188,7 +191,8 @@ def _type(annotation: Any, metadata: list[Any]) -> tuple[Any, Bounds, tuple[bool
             annotation, *more = get_args(annotation)
             metadata += [part for each in more for part in (each.metadata if isinstance(each, FieldInfo) else [each])]
         elif origin in (Union, UnionType):
-            kinds = [kind for kind in get_args(annotation) if kind is not type(None)]
+            # A spectrum is a table, and its colour has no field of its own.
+            kinds = [kind for kind in get_args(annotation) if kind is not type(None) and not _is_spectrum(kind)]
             if len(kinds) != 1:
                 return None, (None, None), (False, False)
             annotation = kinds[0]
@@ -198,6 +202,11 @@ def _type(annotation: Any, metadata: list[Any]) -> tuple[Any, Bounds, tuple[bool
     found = {name: float(getattr(part, name)) for part in metadata for name in ("ge", "gt", "le", "lt") if hasattr(part, name)}
     bounds = found.get("ge", found.get("gt")), found.get("le", found.get("lt"))
     return annotation, bounds, ("gt" in found, "lt" in found)
+
+
+def _is_spectrum(annotation: Any) -> bool:
+    """Returns whether a type is that of a spectrum, with or without annotations."""
+    return (get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation) is Spectrum
 
 
 def _is_vector(value: Any) -> bool:

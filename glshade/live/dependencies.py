@@ -12,8 +12,8 @@ from glshade.files import read_bytes
 from glshade.glsl.shaders import SHIPPED
 from glshade.limits import LARGEST_SCENE
 
-# The keys of a scene file whose values are paths of files.
-PATHS = frozenset({"mesh", "texture", "ocio"})
+# The keys of a scene file whose values are paths of files. Some of them may hold another name, which then names no file.
+PATHS = frozenset({"mesh", "texture", "ocio", "file", "spectrum", "reradiation", "white"})
 
 
 def folders_of(*roots: str | Path) -> set[Path]:

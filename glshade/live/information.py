@@ -123,7 +123,7 @@ def _programs(drawn: Prepared, known: Collection[Program]) -> list[Table]:
         tables.append(
             {
                 "name": str(first.plan),
-                "objects": list(dict.fromkeys(call.instance.name for call in group)),
+                "objects": list(dict.fromkeys(instance.name for call in group for instance in call.instances)),
                 "reasons": [f"{text}: {because}" for text, because in why.items()],
                 "milliseconds": {"compile and link": 1000 * first.program.seconds},
                 "rebuilt": first.program not in known,

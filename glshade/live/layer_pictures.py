@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.image import cryptomatte
+from glshade.image.layers import SPECTRAL, wavelength_of
 from glshade.image.srgb import linear_to_srgb
+from glshade.optics.observer import WAVELENGTHS, rgb_weights
 
 Array = NDArray[Any]
 # The light layers of a scene are named after its lights, and all begin with this.
@@ -34,6 +36,8 @@ def layer_picture(layer: str, arrays: Mapping[str, Array]) -> Array:
         # The first two channels hold the number of the object that covers most of the pixel, and its share of the pixel.
         first = arrays[f"{cryptomatte.OBJECT}00"]
         return _coded(_hues(first[..., 0].view(np.uint32)) * first[..., 1:2])
+    if layer == "spectrum":
+        return _coded(linear_to_srgb(np.maximum(_seen(arrays), 0.0)))
     if layer == "lights":
         layer = next(name for name in arrays if name.startswith(LIGHT))
     values = np.nan_to_num(arrays[layer].astype(np.float64))
@@ -52,6 +56,16 @@ def layer_picture(layer: str, arrays: Mapping[str, Array]) -> Array:
     if layer in ("object_id", "material_id", "semantic_id"):
         return _coded(_hues(values[..., 0].astype(np.uint32)))
     return _coded(linear_to_srgb(np.maximum(values, 0.0)))
+
+
+def _seen(arrays: Mapping[str, Array]) -> Array:
+    """Returns the colours (H, W, 3), linear Rec. 709, of the channels of a spectrum, whose bands are equally wide."""
+    channels = {wavelength_of(name): values for name, values in arrays.items() if name.startswith(SPECTRAL)}
+    wavelengths = sorted(channels)
+    width = (wavelengths[-1] - wavelengths[0]) / (len(wavelengths) - 1)
+    weights = width * np.stack([np.interp(wavelengths, WAVELENGTHS, column) for column in rgb_weights().T], axis=1)
+    seen: Array = np.concatenate([channels[wavelength] for wavelength in wavelengths], axis=2) @ weights
+    return seen
 
 
 def _coded(values: Array) -> Array:

@@ -16,7 +16,6 @@ from typing import Any, TypeVar
 from pydantic import ValidationError
 
 from glshade.brdfs import Brdf
-from glshade.document import Document
 from glshade.errors import SceneError
 from glshade.gl.renderer import Renderer
 from glshade.glsl.shaders import Shaders
@@ -219,14 +218,15 @@ def with_pictures(scene: Scene, copy: Callable[[Path], Path]) -> Scene:
 
 
 def _material(material: Any, copy: Callable[[Path], Path]) -> Any:
-    """Returns a material with other files for its textures; the same object where it has none."""
-    assert isinstance(material, Document)
+    """Returns a material with other files for its textures and tables; the same object where it has none."""
+    assert isinstance(material, Brdf)
     pictures = {name: getattr(material, name) for name in type(material).model_fields}
-    changed = {
+    changed: dict[str, Any] = {
         name: picture.model_copy(update={"texture": copy(picture.texture)})
         for name, picture in pictures.items()
         if isinstance(picture, Picture) and isinstance(picture.texture, Path)
     }
+    changed |= {key: copy(path) for key in material.tables.values() if isinstance(path := getattr(material, key), Path)}
     return material.model_copy(update=changed) if changed else material
 
 

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from glshade.arrays import Array, Float64, Int64
-from glshade.mesh.geometry import Triangles, blocks, face_normals, smooth_by_label
+from glshade.mesh.geometry import Triangles, blocks, normals_and_angles, smooth_by_label
+from glshade.mesh.topology import Bool, Corners, Int32, Topology, topology_of
 from glshade.mesh.welding import weld
 
-Int32: TypeAlias = NDArray[np.int32]
-Bool: TypeAlias = NDArray[np.bool_]
 # A rule takes two arrays of triangles (N,) that share an edge, and returns whether the surface is smooth across it (N,).
 Rule: TypeAlias = Callable[[Array, Array], Bool]
 
@@ -24,9 +22,6 @@ Rule: TypeAlias = Callable[[Array, Array], Bool]
 THRESHOLD_SLACK = 0.01
 # A triangle without area has no normal. Its edges count as bent by 90 degrees, for which the square of the chord is this.
 CHORD2_OF_FLAT = 2.0
-# Of the triangles that share one edge, each is compared with this many that follow it in the list. A mesh with more triangles
-# at an edge is broken, and comparing all pairs would take quadratic time.
-MOST_AT_AN_EDGE = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +51,15 @@ def bent_less(faces: Float64, threshold: float) -> Rule:
         return lambda one, other: np.ones(len(one), dtype=np.bool_)
     largest = 4 * np.sin(np.radians(max(threshold - THRESHOLD_SLACK, THRESHOLD_SLACK)) / 2) ** 2
 
+    columns = [np.ascontiguousarray(column) for column in faces.T]  # NumPy is slow along an axis of three
+    flat = (columns[0] == 0) & (columns[1] == 0) & (columns[2] == 0)
+    any_flat = bool(flat.any())
+
     def rule(one: Array, other: Array) -> Bool:
-        n, m = faces.take(one, axis=0), faces.take(other, axis=0)
-        difference = n - m
-        chord2 = np.einsum("ij,ij->i", difference, difference)
-        chord2[~n.any(axis=1) | ~m.any(axis=1)] = CHORD2_OF_FLAT
+        dx, dy, dz = (column.take(one) - column.take(other) for column in columns)
+        chord2 = dx * dx + dy * dy + dz * dz
+        if any_flat:
+            chord2[flat[one] | flat[other]] = CHORD2_OF_FLAT
         smooth: Bool = chord2 < largest
         return smooth
 
@@ -93,45 +92,64 @@ def split(mesh: Triangles, attributes: list[Array], own: int, rule: Callable[[Fl
     normals, weighted by their angles at the vertex (Thuermer and Wuethrich 1998). Vertices at equal positions are treated as
     one, so that the normals agree across seams of uvs and colours.
     """
-    place = weld(mesh.positions)
-    faces = face_normals(mesh)
-    group, count = _fans(place.astype(np.int32).take(mesh.triangles), rule(faces))
-    normals = smooth_by_label(mesh, group, count, faces)
-    del faces
-    group, triangles = group[: 3 * own], mesh.triangles[:own].reshape(-1)
-    if attributes:  # the neighbours' vertices, which come last, have none
-        place = weld(place[: len(attributes[0]), None], *attributes)
-    corner_vertex = place[triangles]
+    faces, angles = normals_and_angles(mesh)
+    corners = _corners(topology_of(mesh), attributes, own, rule(faces))
+    normals = smooth_by_label(faces, angles, corners.group, corners.count)
+    return Split(corners.source, corners.label, normals[corners.which])
+
+
+def _corners(edges: Topology, attributes: list[Array], own: int, rule: Rule) -> Corners:
+    """Returns the new vertices of a mesh: those of the last mesh with this topology, if the same edges are smooth.
+
+    attributes, own: as for `split`.
+    rule: decides which edges are smooth.
+    """
+    smooth = _smooth(edges.pairs, rule)
+    # The neighbours' vertices, which come last, have no attributes.
+    vertex = weld(edges.place[: len(attributes[0]), None], *attributes) if attributes else edges.place
+    last = edges.corners
+    if last and last.own == own and np.array_equal(last.smooth, smooth) and np.array_equal(last.vertex, vertex):
+        return last
+    group, count = _fans(edges, smooth)
+    triangles = edges.triangles[:own].reshape(-1)
+    corner_vertex, own_group = vertex[triangles], group[: 3 * own]
     one = np.empty(count, dtype=np.int64)
-    one[group] = corner_vertex
-    if own == len(mesh.triangles) and np.array_equal(one[group], corner_vertex):
-        label, labels = group, count
+    one[own_group] = corner_vertex
+    if own == len(edges.triangles) and np.array_equal(one[own_group], corner_vertex):
+        label, labels = own_group, count
     else:
-        label = weld((group << 32 | corner_vertex)[:, None])
+        label = weld((own_group << 32 | corner_vertex)[:, None])
         labels = int(label.max()) + 1
     source = np.empty(labels, dtype=np.int64)
     source[label[::-1]] = triangles[::-1]  # the last write wins, so writing backwards keeps the first
     which = np.empty(labels, dtype=np.int64)
-    which[label] = group
-    return Split(source, label, normals[which])
+    which[label] = own_group
+    edges.corners = Corners(smooth, vertex, own, group, count, source, label, which)
+    return edges.corners
 
 
-def _fans(places: Int32, rule: Rule) -> tuple[Int64, int]:
+def _smooth(pairs: tuple[Int32, Int32], rule: Rule) -> Bool:
+    """Returns which pairs of edges are smooth (E,)."""
+    smooth = np.empty(len(pairs[0]), dtype=np.bool_)
+    for block in blocks(len(smooth)):
+        e1, e2 = (edges[block] for edges in pairs)
+        smooth[block] = rule(e1 // 3, e2 // 3)
+    return smooth
+
+
+def _fans(edges: Topology, smooth: Bool) -> tuple[Int64, int]:
     """Groups the triangle corners that share a normal. Returns the group of each corner (3T,), from 0, and their number.
 
-    places: (T, 3) the label of the position of each corner.
-    rule: decides which edges are smooth.
+    smooth: (E,) which of the pairs of edges are smooth.
 
     Two corners at one place are joined if their triangles share a smooth edge that starts there. A group is a connected
     component of joined corners.
     """
-    tail = places.reshape(-1)
-    head = places[:, [1, 2, 0]].reshape(-1)
+    tail, head = edges.places.reshape(-1), edges.places[:, [1, 2, 0]].reshape(-1)
     forth = tail < head
     one, other = [], []
-    for e1, e2 in _pairs(tail, head):
-        smooth = rule(e1 // 3, e2 // 3)
-        e1, e2 = e1[smooth], e2[smooth]
+    for block in blocks(len(smooth)):
+        e1, e2 = (edge[block][smooth[block]] for edge in edges.pairs)
         for end in (True, False):
             one.append(_corner_at(e1, forth[e1] == end))
             other.append(_corner_at(e2, forth[e2] == end))
@@ -148,28 +166,6 @@ def _corner_at(edge: Int32, start: Bool) -> Int32:
     """
     corner: Int32 = np.where(start, edge, np.where(edge % 3 == 2, edge - 2, edge + 1))
     return corner
-
-
-def _pairs(tail: Int32, head: Int32) -> list[tuple[Int32, Int32]]:
-    """Returns the pairs of edges that join the same two places, as a list of two arrays (N,) of edges, in blocks.
-
-    tail, head: (3T,) the places at which the edges start and end. An edge without length has no partner.
-    """
-    key = np.minimum(tail, head).astype(np.int64)
-    key <<= 32
-    key |= np.maximum(tail, head)
-    order = np.argsort(key, kind="stable").astype(np.int32)
-    key = key[order]
-    pairs = []
-    for step in range(1, MOST_AT_AN_EDGE + 1):
-        first = np.flatnonzero(key[step:] == key[:-step])
-        if not len(first):
-            break
-        for block in blocks(len(first)):
-            e1, e2 = order[first[block]], order[first[block] + step]
-            long = tail[e1] != head[e1]
-            pairs.append((e1[long], e2[long]))
-    return pairs
 
 
 def _components(count: int, one: Int32, other: Int32) -> tuple[Int64, int]:

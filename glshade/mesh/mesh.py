@@ -20,7 +20,8 @@ from glshade.errors import AssetError, AssetWarning
 from glshade.mesh.checking import Arrays, Faults, checked, nothing_finite
 from glshade.mesh.fans import of_one_group, split
 from glshade.mesh.frames import framed
-from glshade.mesh.geometry import Triangles, box, by_corner, centred, in_use, smooth_by_label
+from glshade.mesh.geometry import Triangles, box, by_corner, centred, in_use, normals_and_angles, smooth_by_label
+from glshade.mesh.topology import topology_of
 from glshade.mesh.welding import normalised, weld
 
 # The number of columns of each optional array.
@@ -134,7 +135,10 @@ class Mesh:
             raise AssetError(nothing_finite(faults))
         for line in faults.lines():
             warnings.warn(line, AssetWarning, stacklevel=2)
-        return cls.of_arrays(arrays, *centred(arrays.positions))
+        mesh = cls.of_arrays(arrays, *centred(arrays.positions))
+        # The checks have left out the vertices that no triangle uses, so that nobody need search for them again.
+        vars(mesh)["is_whole"] = True
+        return mesh
 
     @classmethod
     def of_arrays(
@@ -173,7 +177,8 @@ class Mesh:
         """
         if lost.any():
             label = weld(self.positions)
-            n[lost] = smooth_by_label(self, label[self.triangles.reshape(-1)], int(label.max()) + 1)[label[lost]]
+            corners, count = label[self.triangles.reshape(-1)], int(label.max()) + 1
+            n[lost] = smooth_by_label(*normals_and_angles(self), corners, count)[label[lost]]
         frame = None if tangents is None else framed(n, tangents[:, :3], np.where(tangents[:, 3] < 0, -1.0, 1.0))
         return replace(self, normals=n.astype(np.float32), tangents=frame, neighbours=None)
 
@@ -205,15 +210,25 @@ class Mesh:
         arrays = (getattr(self, f.name) for f in fields(self))
         return sum(array.nbytes for array in arrays if array is not None)
 
+    @property
+    def counts(self) -> tuple[int, int]:
+        """The numbers of vertices and triangles."""
+        return len(self.positions), len(self.triangles)
+
     @cached_property
     def bounds(self) -> Float64:
         """(2, 3) float64, the least and the greatest corner of the box round the vertices in use, in object space."""
         return np.stack(box(self.drawn)).astype(np.float64) + self.origin
 
+    @cached_property
+    def is_whole(self) -> bool:
+        """Whether triangles or lines use every vertex."""
+        return bool(in_use(len(self.positions), self.triangles, self.strokes).all())
+
     @property
     def drawn(self) -> Float32:
         """The positions (U, 3) of the vertices that triangles or lines use, relative to the origin."""
-        return in_use(self.positions, self.triangles, self.strokes)
+        return self.positions if self.is_whole else self.positions[in_use(len(self.positions), self.triangles, self.strokes)]
 
     @cached_property
     def is_solid(self) -> bool:
@@ -223,7 +238,7 @@ class Mesh:
         if every directed edge occurs once, its reverse occurs once, and the signed volume is positive.
         """
         # Fewer triangles than those of a tetrahedron enclose nothing.
-        if len(self.triangles) < 4 or not _is_closed(weld(self.positions).astype(np.int32).take(self.triangles)):
+        if len(self.triangles) < 4 or not topology_of(self).is_closed:
             return False
         total, size = 0.0, 0.0
         for _, ((x1, y1, z1), (x2, y2, z2), (x3, y3, z3)) in by_corner(self, self.bounds.mean(axis=0) - self.origin):
@@ -231,27 +246,6 @@ class Mesh:
             total, size = total + float(terms.sum()), size + float(np.abs(terms).sum())
         # A sheet folded onto itself is closed too, but its volume consists of rounding errors.
         return total > 1e-12 * size
-
-
-def _is_closed(places: Array) -> bool:
-    """Returns whether every directed edge occurs once, and its reverse occurs once.
-
-    places: (T, 3) int32, the label of the position of each corner. Triangles with two equal labels do not count.
-    """
-    flat = places.reshape(-1) == places[:, [1, 2, 0]].reshape(-1)
-    if flat.any():
-        places = places[~flat.reshape(-1, 3).any(axis=1)]
-    tail, head = places.reshape(-1), places[:, [1, 2, 0]].reshape(-1)
-    if len(tail) % 2 or not len(tail):
-        return False
-    # The lowest bit is the direction. Of a sorted list, each two neighbours must then be the two directions of one edge.
-    key = np.minimum(tail, head).astype(np.uint64)
-    key <<= np.uint64(32)
-    key |= np.maximum(tail, head).astype(np.uint64) << np.uint64(1)
-    key |= tail < head
-    key.sort()
-    paired = not (key[0::2] & np.uint64(1)).any() and np.array_equal(key[0::2] | np.uint64(1), key[1::2])
-    return paired and bool((key[2::2] != key[:-2:2]).all())
 
 
 def _own(array: Array) -> Array:

@@ -12,6 +12,17 @@ from glshade.mesh.mesh import Mesh, gather
 
 # A mesh with more triangles than this does not fit the caches of a processor, and its order begins to matter.
 ORDERED_ABOVE = 1000
+# The numbers of triangles in a run, of vertices in a line, and of runs that `is_coherent` looks at. A processor fetches memory
+# in lines of 64 bytes, which hold a few neighbouring vertices; 64 runs tell the mean of a mesh within a tenth.
+RUN, LINE, RUNS = 32, 16, 64
+# A mesh is coherent if a run of its triangles needs at most so many lines, and spans at most so many lengths of an edge. Grids,
+# most subdivided meshes and lists of separate triangles need 4 to 18 lines and span 7 to 24 edges, and draw in their own order
+# as fast as along a Morton curve. Meshes with shuffled vertices or triangles need 34 to 96 lines, and draw up to 2.5 times as
+# fast along the curve. Of runs that span hundreds of edges, none is turned away from the viewer as a whole.
+MOST_LINES, MOST_EDGES = 24, 32
+
+# The place, in a run, of the corner that follows each corner of a triangle.
+NEXT_CORNER = np.arange(3 * RUN).reshape(-1, 3)[:, [1, 2, 0]].reshape(-1)
 
 # The results of is_local.
 _local: WeakKeyDictionary[Mesh, bool] = WeakKeyDictionary()
@@ -60,9 +71,29 @@ def in_local_order(mesh: Mesh) -> Mesh:
     return local
 
 
+def is_coherent(mesh: Mesh) -> bool:
+    """Returns whether triangles that follow each other lie close together, both in space and in memory.
+
+    It looks at some runs of triangles, evenly spaced over the mesh.
+    """
+    runs = mesh.triangles[: len(mesh.triangles) // RUN * RUN].reshape(-1, 3 * RUN)
+    some = runs[np.linspace(0, len(runs) - 1, min(len(runs), RUNS)).astype(np.intp)]
+    lines = np.sort(some // LINE, axis=1)
+    if 1 + (lines[:, 1:] != lines[:, :-1]).sum(axis=1).mean() > MOST_LINES:
+        return False
+    span, edge = np.zeros(len(some)), np.zeros(some.shape)
+    for axis in range(3):  # NumPy is slow along an axis of three
+        x = mesh.positions[some, axis].astype(np.float64)
+        span += np.square(x.max(axis=1) - x.min(axis=1))
+        edge += np.square(x - x[:, NEXT_CORNER])
+    return bool(np.sqrt(span).mean() <= MOST_EDGES * np.sqrt(edge).mean())
+
+
 def ordered(mesh: Mesh) -> Mesh:
-    """Returns the mesh in local order if it has so many triangles that the order matters, and otherwise unchanged."""
-    return in_local_order(mesh) if len(mesh.triangles) > ORDERED_ABOVE else mesh
+    """Returns the mesh in local order if it has so many triangles that the order matters, unless its own order is coherent."""
+    if len(mesh.triangles) <= ORDERED_ABOVE or is_coherent(mesh):
+        return mesh
+    return in_local_order(mesh)
 
 
 def _along_curve(mesh: Mesh) -> UInt32:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import fields
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -14,6 +17,25 @@ from glshade.mesh.checking import matrix
 from glshade.mesh.geometry import centred
 from glshade.mesh.mesh import Mesh
 from glshade.mesh.welding import normalised
+
+
+class DirectedPoints(Mesh):
+    """Points whose normals stay as they are given. Those of other points turn to the viewer. A zero normal still stands for
+    the direction to the viewer.
+    """
+
+    @classmethod
+    def of(cls, mesh: Mesh) -> DirectedPoints:
+        """Returns the points of a mesh, with zero normals where it has none."""
+        arrays = {f.name: getattr(mesh, f.name) for f in fields(mesh)}
+        if mesh.normals is None:
+            arrays["normals"] = _given(np.zeros_like(mesh.positions))
+        return cls(**arrays)
+
+    @cached_property
+    def digest(self) -> str:
+        """The SHA-256 of the arrays and of what they stand for, as 64 hex digits."""
+        return hashlib.sha256(f"directed points {super().digest}".encode()).hexdigest()
 
 
 def segments(order: npt.ArrayLike, mode: Literal["lines", "strip", "loop"]) -> Int64:
@@ -54,29 +76,50 @@ def build_strokes(
     """
     p = matrix(positions, 3, "positions")
     lines = _checked(strokes, len(p))
-    sound: Any = np.isfinite(p).all(axis=1)
-    finite = sound[lines].all(axis=1)
-    lost = len(lines) - int(finite.sum())
-    if lost == len(lines):
-        raise AssetError("has no point or line whose positions are finite numbers")
-    lines = lines[finite] if lost else lines
-    used = np.zeros(len(p), dtype=np.bool_)
-    used[lines] = True
+    lost, used = 0, None
+    if not np.isfinite(p).all():
+        sound: Any = np.isfinite(p).all(axis=1)
+        finite = sound[lines].all(axis=1)
+        lost = len(lines) - int(finite.sum())
+        if lost == len(lines):
+            raise AssetError("has no point or line whose positions are finite numbers")
+        lines = lines[finite]
+    in_use = np.zeros(len(p), dtype=np.bool_)
+    in_use[lines.reshape(-1)] = True
+    if not in_use.all():
+        used = in_use
+        lines = (np.cumsum(used) - 1)[lines]
     n, uv, c = (
-        _of_used(array, columns, name, used)
+        _of_used(array, columns, name, len(p), used)
         for array, columns, name in ((normals, 3, "normals"), (uvs, 2, "uvs"), (colours, 4, "colours"))
     )
-    origin, relative = centred(p[used])
+    origin, relative = centred(p if used is None else p[used])
     mesh = Mesh(
-        positions=relative.astype(np.float32),
+        positions=_given(relative.astype(np.float32)),
         triangles=np.zeros((0, 3), dtype=np.uint32),
         normals=None if n is None else _unit_or_none(n),
-        uvs=None if uv is None else np.where(np.isfinite(uv), uv, 0.0).astype(np.float32),
-        colours=None if c is None else np.where(np.isfinite(c), c, 1.0).astype(np.float32),
+        uvs=None if uv is None else _finite(uv, 0.0),
+        colours=None if c is None else _finite(c, 1.0),
         origin=origin,
-        strokes=(np.cumsum(used) - 1)[lines].astype(np.uint32),
+        strokes=_given(lines.astype(np.uint32)),
     )
     return mesh, lost
+
+
+def _given(array: Any) -> Any:
+    """Returns the array, which is read-only from now on, so that Mesh need not copy it."""
+    array.flags.writeable = False
+    return array
+
+
+def _finite(values: Float64, instead: float) -> Float32:
+    """Returns values (V, n) as float32, with `instead` in place of values that are not finite."""
+    result: Float32 = values.astype(np.float32)
+    finite: Any = np.isfinite(values)
+    if not finite.all():
+        result[~finite] = instead
+    result.flags.writeable = False
+    return result
 
 
 def _checked(strokes: npt.ArrayLike, count: int) -> Int64:
@@ -89,21 +132,24 @@ def _checked(strokes: npt.ArrayLike, count: int) -> Int64:
     for index in (int(lines.min()), int(lines.max())):
         if not 0 <= index < count:
             raise AssetError(f"index {index} of a point or line is out of range: the mesh has {count} vertices")
-    return lines.astype(np.int64)
+    return lines.astype(np.int64, copy=False)
 
 
-def _of_used(array: npt.ArrayLike | None, columns: int, name: str, used: NDArray[np.bool_]) -> Float64 | None:
+def _of_used(
+    array: npt.ArrayLike | None, columns: int, name: str, count: int, used: NDArray[np.bool_] | None
+) -> Float64 | None:
     """Returns the rows of an attribute (V, columns) that belong to vertices in use, as float64; None for None.
 
-    used: (V,), whether each vertex is used.
+    count: the number V of vertices.
+    used: (V,), whether each vertex is used; None where all are.
     Errors: AssetError, with the attribute's name.
     """
     if array is None:
         return None
     values = matrix(array, columns, name)
-    if len(values) != len(used):
-        raise AssetError(f"mesh has {len(used)} positions and {len(values)} {name}")
-    return values[used]
+    if len(values) != count:
+        raise AssetError(f"mesh has {count} positions and {len(values)} {name}")
+    return values if used is None else values[used]
 
 
 def _unit_or_none(normals: Float64) -> Float32 | None:

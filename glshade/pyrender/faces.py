@@ -50,7 +50,7 @@ def numbered(scene: Any, both: bool) -> tuple[list[Object], list[Surface], NDArr
     return objects, surfaces, np.array(starts, dtype=np.int64)
 
 
-def _coloured(primitive: Any, triangles: NDArray[np.int64], first: int) -> Mesh | None:
+def _coloured(primitive: Any, triangles: NDArray[np.integer[Any]], first: int) -> Mesh | None:
     """Returns the mesh of triangles (T, 3) that share no corners, in the colours of the codes from `first`; None if empty."""
     positions = np.asarray(primitive.positions)
     finite = np.isfinite(positions).all(axis=1)[triangles].all(axis=1)

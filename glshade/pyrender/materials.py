@@ -16,7 +16,7 @@ from glshade.brdfs import BRDFS, Brdf
 from glshade.errors import SceneError
 from glshade.mesh.reading import gltf_material
 from glshade.mesh.reading.file import MeshFile
-from glshade.pyrender.textures import picture, rgba
+from glshade.pyrender.textures import has_alpha_below_one, picture
 from glshade.textures.pixel_array import PixelArray
 from glshade.textures.texture import Texture
 
@@ -214,7 +214,7 @@ def _is_transparent(alpha: float, texture: Any, primitive: Any) -> bool:
     return bool(
         alpha < 1
         or (colours is not None and colours.shape[1] == 4 and (colours[:, 3] < 1).any())
-        or (textured and (rgba(texture.source)[..., 3] < 255).any())
+        or (textured and has_alpha_below_one(texture.source))
     )
 
 

@@ -1,4 +1,4 @@
-"""Meshes: converts pyrender's primitives into meshes; points and lines become squares and strips that face the viewer."""
+"""Meshes: converts pyrender's primitives into meshes; lines become strips that face the viewer."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from glshade.assembly.strokes import Viewport, strips
 from glshade.assembly.values import normal_matrix
 from glshade.mesh.mesh import Mesh
-from glshade.mesh.strokes import segments
+from glshade.mesh.strokes import DirectedPoints, build_strokes, segments
 
 Array = NDArray[np.float64]
-Indices = NDArray[np.int64]
+Indices = NDArray[np.integer[Any]]
 
 # The modes of primitives, with the numbers that glTF and OpenGL give them.
 POINTS, LINES, LOOP, LINE_STRIP, TRIANGLES, STRIP, FAN = range(7)
@@ -28,6 +28,11 @@ _meshes: WeakKeyDictionary[Any, tuple[tuple[Any, ...], Mesh]] = WeakKeyDictionar
 def is_drawn_with_strokes(primitive: Any) -> bool:
     """Returns whether a primitive consists of points or lines."""
     return bool(primitive.mode < TRIANGLES)
+
+
+def is_drawn_with_points(primitive: Any) -> bool:
+    """Returns whether a primitive consists of points."""
+    return bool(primitive.mode == POINTS)
 
 
 def arrays(primitive: Any) -> tuple[Any, ...]:
@@ -49,7 +54,7 @@ def mesh(primitive: Any) -> Mesh | None:
         return known[1]
     triangles = corners(primitive)
     positions = np.asarray(primitive.positions)
-    finite = np.isfinite(positions).all(axis=1)
+    finite = _finite(positions)
     if not finite.all():
         triangles = triangles[finite[triangles].all(axis=1)]
         # No triangle uses these vertices any more; 0 stands for numbers that a mesh must not have.
@@ -69,16 +74,24 @@ def corners(primitive: Any) -> Indices:
 
 def lost_triangles(primitive: Any) -> int:
     """Returns how many triangles of a primitive of triangles have a corner that is not finite."""
-    finite = np.isfinite(primitive.positions).all(axis=1)
+    finite = _finite(np.asarray(primitive.positions))
     return 0 if finite.all() else int((~finite[corners(primitive)].all(axis=1)).sum())
 
 
+def _finite(positions: NDArray[Any]) -> NDArray[np.bool_]:
+    """Returns whether each position (V, 3) is finite (V,)."""
+    x, y, z = np.isfinite(positions).T  # NumPy is slow along an axis of three
+    result: NDArray[np.bool_] = x & y & z
+    return result
+
+
 def _order(primitive: Any) -> Indices:
-    """Returns the indices (N,) of the vertices in the order in which they are drawn."""
+    """Returns the indices (N,) of the vertices in the order in which they are drawn, as integers of any type."""
     if primitive.indices is None:
         return np.arange(len(primitive.positions))
-    order: Indices = np.asarray(primitive.indices).reshape(-1).astype(np.int64)
-    return order
+    order = np.asarray(primitive.indices).reshape(-1)
+    # A copy of a large mesh's indices would take longer than the checks that follow.
+    return order if order.dtype.kind in "iu" else order.astype(np.int64)
 
 
 def _triangles(order: Indices, mode: int) -> Indices:
@@ -94,11 +107,26 @@ def _triangles(order: Indices, mode: int) -> Indices:
     return np.stack([np.where(odd, second, first), np.where(odd, first, second), third], axis=1)
 
 
-def strokes(primitive: Any, pose: Array, screen: Viewport) -> Mesh | None:
-    """Returns the mesh in world space of a primitive of points or lines; None if all of them are behind the near plane.
+def points(primitive: Any) -> tuple[Mesh | None, int]:
+    """Returns the mesh of a primitive of points, and the number of points that were left out because they are not finite.
 
-    Points become squares, and lines become strips one pixel wide. As in pyrender, a primitive without normals is lit as if it
-    faced the viewer.
+    As in pyrender, normals do not turn to the viewer, and points without normals are lit as if they faced the viewer. The mesh
+    is None if no point is left.
+    Errors: AssetError.
+    """
+    p = primitive
+    order = _order(p)
+    finite = _finite(np.asarray(p.positions))
+    if not finite[order].any():
+        return None, len(order)
+    mesh, lost = build_strokes(p.positions, np.stack([order, order], axis=1), p.normals, p.texcoord_0, p.color_0)
+    return DirectedPoints.of(mesh), lost
+
+
+def strokes(primitive: Any, pose: Array, screen: Viewport) -> Mesh | None:
+    """Returns the mesh in world space of a primitive of lines; None if all of them are behind the near plane.
+
+    Lines become strips one pixel wide. As in pyrender, a primitive without normals is lit as if it faced the viewer.
 
     primitive: a pyrender.Primitive.
     pose: (4, 4), from the primitive's space to world space.
@@ -123,9 +151,7 @@ def strokes(primitive: Any, pose: Array, screen: Viewport) -> Mesh | None:
 
 
 def _ends(order: Indices, mode: int) -> Indices:
-    """Returns the vertices (S, 2) that the strokes of a primitive join. order: the vertices (N,) in drawing order."""
-    if mode == POINTS:
-        return np.stack([order, order], axis=1)
+    """Returns the vertices (S, 2) that the lines of a primitive join. order: the vertices (N,) in drawing order."""
     kind: Literal["lines", "strip", "loop"] = "lines" if mode == LINES else "loop" if mode == LOOP else "strip"
     lines = segments(order, kind)
     # OpenGL draws nothing for a line from a vertex to itself.

@@ -149,8 +149,8 @@ class OffscreenRenderer:
         kind: Literal["lit", "flat", "silhouette"] = "silhouette"
         if plain:
             kind = "flat" if RenderFlags.FLAT in wanted else "lit"
-        look = Look(kind, RenderFlags.SKIP_CULL_FACES in wanted, colours, kind == "lit" and self._most_lights is not None)
-        converted = self._conversion.convert(scene, nodes, look, lambda: screen(camera, size, self.point_size))
+        look = Look(kind, RenderFlags.SKIP_CULL_FACES in wanted, colours, kind == "lit" and self._most_lights is not None, True)
+        converted = self._conversion.convert(scene, nodes, look, lambda: screen(camera, size))
         for note in converted.notes:
             self._warn(note)
         if kind == "lit" and self._most_lights is None and crowded(scene):
@@ -164,7 +164,7 @@ class OffscreenRenderer:
                 wires = _wires(converted, wanted) if plain else set()
                 shown_lights = lights(scene, self._most_lights) if kind == "lit" else AS_THEY_ARE
                 encoding: Literal["power", "linear"] = "power" if kind == "lit" else "linear"
-                view, unit = painter.paint(converted.objects, wires, shown_lights, camera, canvas, encoding)
+                view, unit = painter.paint(converted.objects, wires, shown_lights, camera, canvas, encoding, self.point_size)
                 canvas.resolve()
                 depth = canvas.depth(view, unit * getattr(camera, "depth_scale", 1.0), getattr(camera, "planes", None))
             else:
@@ -187,12 +187,13 @@ class OffscreenRenderer:
 
         painter, size, camera = self._begin(scene)
         result = np.zeros((size[1], size[0], 3), dtype=np.float32)
-        look = Look(both=RenderFlags.SKIP_CULL_FACES in RenderFlags(int(flags)))
-        converted = self._conversion.convert(scene, scene.mesh_nodes, look, lambda: screen(camera, size, self.point_size))
+        look = Look(both=RenderFlags.SKIP_CULL_FACES in RenderFlags(int(flags)), together=True)
+        converted = self._conversion.convert(scene, scene.mesh_nodes, look, lambda: screen(camera, size))
         for note in converted.notes:
             self._warn(note)
         if converted.objects:
-            drawn = Scene.model_construct(objects=tuple(converted.objects), lights=(), camera=camera, film=Film(size=size))
+            film = Film(size=size).model_copy(update={"point_size": self.point_size})
+            drawn = Scene.model_construct(objects=tuple(converted.objects), lights=(), camera=camera, film=film)
             (pixels,) = painter.renderer.draw_part(drawn, Part("normal"))
             length = np.linalg.norm(pixels[..., :3], axis=2, keepdims=True)
             np.divide(pixels[..., :3], length, out=result, where=length > 0)

@@ -61,6 +61,7 @@ class Painter:
         camera: Any,
         canvas: Canvas,
         encoding: Literal["power", "linear"],
+        point_size: float = 1.0,
     ) -> tuple[View, float]:
         """Draws objects into a canvas and returns (view, the length of the view's unit [scene units]).
 
@@ -72,9 +73,13 @@ class Painter:
         camera: glshade's camera that sees the objects.
         canvas: the framebuffer to draw into.
         encoding: "power" encodes colours with a power of 1 / 2.2 as pyrender does, "linear" leaves them as they are.
+        point_size: the side of the squares that points become [pixels].
         Errors: SceneError.
         """
-        ready = self._prepared(objects, lights, camera, canvas.size, encoding)
+        # The canvas averages samples by itself, so that the film needs none. A supersampled film does not move the squares of
+        # points to the edges of pixels. model_copy does not refuse the sizes of points that pyrender allows.
+        film = Film(size=canvas.size).model_copy(update={"point_size": point_size, "supersample": 2})
+        ready = self._prepared(objects, lights, camera, film, encoding)
         view = ready.prepared.assembly.view
         # glshade's own pictures are upside down already, as the picture of a flipped camera has to be.
         turn = 1.0 if getattr(camera, "flipped", False) else UPRIGHT
@@ -110,18 +115,20 @@ class Painter:
             canvas = self._canvases[samples, coloured] = Canvas(self.renderer.context, size, samples, coloured)
         return canvas
 
-    def _prepared(
-        self, objects: list[Object], lights: tuple[Light, ...], camera: Any, size: tuple[int, int], encoding: str
-    ) -> Ready:
+    def _prepared(self, objects: list[Object], lights: tuple[Light, ...], camera: Any, film: Film, encoding: str) -> Ready:
         """Returns the scene of these objects, ready to draw. It comes from the cache if none of its parts has changed."""
-        for index, known in enumerate(self._ready):
-            scene = known.prepared.scene
-            same = len(scene.objects) == len(objects) and all(map(operator.is_, scene.objects, objects))
-            if same and (scene.lights, scene.camera, scene.film.size, known.encoding) == (lights, camera, size, encoding):
-                self._ready.append(self._ready.pop(index))
-                return known
         # model_construct skips validation: all parts are valid, and validating many objects takes as long as drawing them.
-        scene = Scene.model_construct(objects=tuple(objects), lights=lights, camera=camera, film=Film(size=size))
+        scene = Scene.model_construct(objects=tuple(objects), lights=lights, camera=camera, film=film)
+        for index, known in reversed(list(enumerate(self._ready))):
+            before = known.prepared.scene
+            same = len(before.objects) == len(objects) and all(map(operator.is_, before.objects, objects))
+            if same and (before.lights, before.film, known.encoding) == (lights, film, encoding):
+                if before.camera == camera:
+                    self._ready.append(self._ready.pop(index))
+                    return known
+                # The renderer prepares nothing but the view of a scene that shares all values with an earlier one.
+                scene = before.through(camera)
+                break
         # The renderer accepts "power" too, but a film has no such encoding, so its type does not name it.
         any_encoding: Any = encoding
         prepared = self.renderer.prepare(scene, None, any_encoding)
@@ -141,6 +148,4 @@ UPRIGHT = np.array([[1.0], [-1.0], [1.0], [1.0]])
 
 def _upright(call: DrawCall) -> DrawCall:
     """Returns the draw call with the opposite winding of front faces, which turning the picture reverses."""
-    instance = replace(call.instance)
-    vars(instance)["mirrored"] = not call.instance.mirrored
-    return replace(call, instance=instance)
+    return replace(call, mirrored=not call.mirrored)

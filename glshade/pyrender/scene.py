@@ -18,11 +18,12 @@ from glshade.brdfs import Brdf
 from glshade.errors import SceneError
 from glshade.image.srgb import srgb_to_linear
 from glshade.lights import LIGHTS, Light
+from glshade.mesh.copies import Copies, are_flat
 from glshade.mesh.file import AssetWarning
 from glshade.mesh.mesh import Mesh
 from glshade.pyrender.cameras import affine_rows, camera
 from glshade.pyrender.materials import WHITE, Colour, material, silhouette
-from glshade.pyrender.meshes import arrays, is_drawn_with_strokes, lost_triangles, mesh, strokes
+from glshade.pyrender.meshes import arrays, is_drawn_with_points, is_drawn_with_strokes, lost_triangles, mesh, points, strokes
 from glshade.scene.camera import Perspective, is_singular
 from glshade.scene.film import Film
 from glshade.scene.object import Object, Transform
@@ -40,8 +41,8 @@ def from_pyrender(scene: Any, size: tuple[int, int] = (640, 480)) -> Scene:
     """Returns the Scene of a pyrender.Scene, with 4 samples a pixel as in pyrender's pictures.
 
     It has the meshes with their instances, materials and textures, the lights, the main camera and the background. If there is
-    no camera, a default one is chosen that shows the whole scene. Points become squares and lines become strips, a pixel wide
-    as seen by the main camera. AssetWarnings list everything that has no counterpart in glshade and is left out.
+    no camera, a default one is chosen that shows the whole scene. Lines become strips, a pixel wide as seen by the main camera.
+    AssetWarnings list everything that has no counterpart in glshade and is left out.
 
     scene: a pyrender.Scene.
     size: width, height of the picture [pixels].
@@ -85,16 +86,15 @@ def main_camera(scene: Any, size: tuple[int, int]) -> Any:
     return None if node is None else camera(node.camera, scene.get_pose(node), size)
 
 
-def screen(main: Any, size: tuple[int, int], point_size: float = 1.0) -> Viewport:
-    """Returns the picture in which points and lines have a width.
+def screen(main: Any, size: tuple[int, int]) -> Viewport:
+    """Returns the picture in which lines have a width.
 
     main: pyrender's main camera, converted to a camera of glshade.
     size: width, height of the picture [pixels].
-    point_size: the side of the squares that points become [pixels].
     """
     # `view` fits the far plane to the points that it is given. Squares and strips do not depend on the far plane, so any point
     # will do.
-    return Viewport(main.view(np.zeros((1, 3)), size[0] / size[1]), size, point_size)
+    return Viewport(main.view(np.zeros((1, 3)), size[0] / size[1]), size)
 
 
 @dataclass(frozen=True)
@@ -105,19 +105,21 @@ class Look:
     both: True to draw back faces even where a material does not ask for it.
     colours: node -> colour of its silhouette, from 0 to 1; the default is white.
     named: whether objects are named after the places of their nodes, as `lights` needs for a limited number of lights.
+    together: whether the instances of a primitive of triangles are one object.
     """
 
     kind: Literal["lit", "flat", "silhouette"] = "lit"
     both: bool = False
     colours: Mapping[Any, Colour] = field(default_factory=dict)
     named: bool = False
+    together: bool = False
 
 
 @dataclass(eq=False)
 class Converted:
     """Converted nodes.
 
-    objects: the N objects, one for every instance of every primitive.
+    objects: the N objects, one for every instance of every primitive, or for all instances of one.
     names: N pairs, the object's name and its material's name. A name is empty if pyrender's object has no name.
     wires: the numbers of the objects that pyrender draws as wireframes.
     notes: the warnings about everything that was left out, each once.
@@ -150,7 +152,7 @@ class Conversion:
         scene: the pyrender.Scene that the nodes belong to.
         nodes: the nodes to convert.
         look: the way in which materials are converted.
-        make_viewport: returns the picture in which points and lines have a width; None leaves them out with a warning.
+        make_viewport: returns the picture in which lines have a width; None leaves them out with a warning.
         Errors: SceneError.
         """
         placed = in_order(scene, nodes)
@@ -178,18 +180,26 @@ class Conversion:
                         result.warn(
                             f"{node.mesh.name or 'a mesh'}: {lost} triangles with a corner that is not finite are left out"
                         )
-                for world in instances(primitive, pose):
-                    if not is_drawn_with_strokes(primitive):
+                together = look.together and primitive.poses is not None and not is_drawn_with_strokes(primitive)
+                for world in [pose] if together else instances(primitive, pose):
+                    shape: Mesh | Copies | None
+                    if together:
+                        shape = self._copies(mesh(primitive), primitive.poses, cached)
+                    elif not is_drawn_with_strokes(primitive):
                         shape = mesh(primitive)
+                    elif is_drawn_with_points(primitive):
+                        shape, lost = cached(sources, ("points", *map(id, sources)), partial(points, primitive))
+                        if lost:
+                            result.warn(f"{node.mesh.name or 'a mesh'}: {lost} points that are not finite are left out")
                     elif make_viewport is not None:
                         viewport = viewport or make_viewport()
                         key = (*map(id, sources), world.tobytes(), viewport.key)
                         shape = cached(sources, key, partial(strokes, primitive, world, viewport))
-                        # The mesh of points and lines is in world space already.
+                        # The mesh of lines is in world space already.
                         world = np.eye(4)
                     else:
                         shape = None
-                        result.warn("points and lines are left out: they are as wide as pixels, and the scene has no camera")
+                        result.warn("lines are left out: they are as wide as pixels, and the scene has no camera")
                     if shape is None:
                         continue
                     name = place_name(pose) if look.named else None
@@ -202,6 +212,16 @@ class Conversion:
                         result.names.append((node.name or node.mesh.name or "", primitive.material.name or ""))
         self._last[look.kind, look.both] = current
         return result
+
+    @staticmethod
+    def _copies(shape: Mesh | None, poses: Any, cached: Callable[..., Any]) -> Copies | None:
+        """Returns a mesh at several poses (N, 4, 4); None without a mesh, or if every pose flattens it."""
+        if shape is None:
+            return None
+        placed = np.asarray(poses, dtype=np.float64)
+        # The bytes tell of poses that are changed in place.
+        copies: Copies | None = cached((shape,), ("copies", id(shape), placed.tobytes()), partial(copied, shape, placed))
+        return copies
 
 
 def in_order(scene: Any, nodes: Iterable[Any]) -> list[tuple[Any, Array]]:
@@ -220,7 +240,15 @@ def instances(primitive: Any, pose: Array) -> Iterator[Array]:
         yield from (pose @ own for own in primitive.poses.astype(np.float64))
 
 
-def placed_object(shape: Mesh, brdf: Brdf, pose: Array, coloured: bool, name: str | None = None) -> Object | None:
+def copied(shape: Mesh, poses: Array) -> Copies | None:
+    """Returns a mesh at those of the poses (N, 4, 4) that do not flatten it; None if all of them do."""
+    solid = poses[~are_flat(poses[:, :3, :3])]
+    # The last row is replaced, in case it has rounding errors.
+    solid[:, 3] = 0, 0, 0, 1
+    return Copies.build(shape, solid) if len(solid) else None
+
+
+def placed_object(shape: Mesh | Copies, brdf: Brdf, pose: Array, coloured: bool, name: str | None = None) -> Object | None:
     """Returns an object; None if its pose (4, 4) flattens it, because a flat object covers no pixel."""
     if is_singular(pose[:3, :3]):
         return None

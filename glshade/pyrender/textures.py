@@ -27,18 +27,28 @@ def picture(texture: Any, white: bool = False) -> PixelArray | None:
     cached = _known.setdefault(texture, {})
     known = cached.get(white)
     if known is None or known[0] is not source:
-        pixels = rgba(source)
+        pixels = colours(source)
         if white:
-            pixels[..., :3] = 255
+            alpha = pixels[..., 3:] if pixels.shape[2] == 4 else 255
+            pixels = np.full((*pixels.shape[:2], 4), 255, dtype=np.uint8)
+            pixels[..., 3:] = alpha
         known = cached[white] = source, PixelArray.of(pixels)
     return known[1]
 
 
-def rgba(source: Any) -> Bytes:
-    """Returns pixels (H, W, 4) from (H, W) or (H, W, C). As in OpenGL, missing colours are 0 and a missing alpha is 1."""
+def colours(source: Any) -> Bytes:
+    """Returns pixels (H, W, 3 or 4) from (H, W) or (H, W, C). As in OpenGL, missing colours are 0."""
     pixels = np.asarray(source, dtype=np.uint8)
     pixels = pixels.reshape(*pixels.shape[:2], -1)
-    result = np.zeros((*pixels.shape[:2], 4), dtype=np.uint8)
-    result[..., 3] = 255
-    result[..., : pixels.shape[2]] = pixels
+    count = min(pixels.shape[2], 4)
+    result = np.zeros((*pixels.shape[:2], max(count, 3)), dtype=np.uint8)
+    # pyrender's arrays hold one channel after the other, which NumPy takes twice as long to copy at once.
+    for channel in range(count):
+        result[..., channel] = pixels[..., channel]
     return result
+
+
+def has_alpha_below_one(source: Any) -> bool:
+    """Returns whether any of the pixels, as `colours` takes them, has an alpha below 1."""
+    pixels = np.asarray(source)
+    return pixels.ndim == 3 and pixels.shape[2] >= 4 and bool((pixels[..., 3].astype(np.uint8) < 255).any())

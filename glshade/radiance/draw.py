@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from glshade.radiance.sampler import Sampler
 from glshade.scene.scene import Scene
 from glshade.textures.texels import Texels, placement_of, texels_of
 from glshade.textures.texture import CHANNELS, DirectionMap, Texture
+from glshade.textures.volume import Volume
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -43,6 +44,31 @@ class Lamp:
     def fields(self, dtype: Any) -> SimpleNamespace:
         """Returns the fields of the GLSL struct as attributes of an object, as arrays of the given NumPy type."""
         return SimpleNamespace(**{name: value.astype(dtype) for name, value in self.values.items()})
+
+
+@dataclass(frozen=True, eq=False)
+class Shared:
+    """What several instances of a scene have in common, and is computed once.
+
+    samplers: the textures that have been read already.
+    lamps: index of a light in the assembly -> the light with the values that are uploaded.
+    """
+
+    samplers: dict[Texels, Sampler] = field(default_factory=dict)
+    lamps: dict[int, Lamp] = field(default_factory=dict)
+
+
+class Text(Protocol):
+    """The GLSL of a draw's programs, which takes the place of the Python functions of the model and the lights."""
+
+    def __call__(self, surface: Any) -> NDArray[Any]:
+        """Returns the light (N, 3) of the points of a Surface."""
+
+    def with_samplers(self, change: Callable[[Sampler], Sampler]) -> Text:
+        """Returns the text with a function applied to each texture that it reads."""
+
+    def with_tables(self, change: Callable[[Volume], Volume]) -> Text:
+        """Returns the text with a function applied to each table that it reads."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +96,10 @@ class Draw:
     turn: cosine and sine (2,) of the angle by which tangents are turned.
     alpha: the material's alpha, which the alpha of the base texture and of vertex colours multiplies.
     alpha_cutoff: least alpha that is drawn, if the alpha mode is "mask".
-    text: optional; takes a Surface and returns the light (N, 3) of its points, in place of the Python functions of the model
-        and the lights.
+    data: name -> table that the model reads, and what the model adds to its tables.
+    shares: the draws of the instance's shares, whose light is added; empty for an instance without shares.
+    weights: matrix (3, 3) that turns the light of three bands of wavelengths into RGB; None for RGB colours.
+    text: optional; computes the light of points in place of the Python functions of the model and the lights.
     """
 
     instance: Instance
@@ -95,7 +123,32 @@ class Draw:
     turn: Array
     alpha: float
     alpha_cutoff: float
-    text: Callable[[Any], NDArray[Any]] | None = None
+    data: dict[str, Any] = field(default_factory=dict)
+    shares: tuple[Draw, ...] = ()
+    weights: Array | None = None
+    text: Text | None = None
+
+    def with_samplers(self, change: Callable[[Sampler], Sampler]) -> Draw:
+        """Returns the draw with a function applied to each texture of its parameters, and to those of its shares."""
+        changed = {name: change(sampler) for name, sampler in self.samplers.items()}
+        shares = tuple(share.with_samplers(change) for share in self.shares)
+        return replace(self, samplers=changed, shares=shares, text=self.text.with_samplers(change) if self.text else None)
+
+    def sampler(self, key: str) -> Sampler:
+        """Returns the texture that the material has under a key. Errors: KeyError if the draw reads no texture of this key."""
+        maps = {"normal_map": self.normal_map, "bump_map": self.normal_map, "tangent_direction": self.directions}
+        return maps.get(key) or self.samplers[key]
+
+    def with_tables(self, change: Callable[[Volume], Volume]) -> Draw:
+        """Returns the draw with a function applied to each table that its model reads, and to those of its shares."""
+        data = {name: change(value) if isinstance(value, Volume) else value for name, value in self.data.items()}
+        shares = tuple(share.with_tables(change) for share in self.shares)
+        return replace(self, data=data, shares=shares, text=self.text.with_tables(change) if self.text else None)
+
+    @property
+    def back_faces(self) -> bool:
+        """Whether back faces are drawn."""
+        return self.instance.back_faces
 
     @property
     def model(self) -> type[Brdf]:
@@ -111,6 +164,12 @@ class Draw:
     def alpha_sampler(self) -> Sampler | None:
         """The texture of the base colour, whose alpha is used; None if the base colour has no texture."""
         return next((self.samplers.get(name) for name, p in self.model.parameters().items() if p.base), None)
+
+    @property
+    def tables(self) -> tuple[Volume, ...]:
+        """The different tables that the model reads, and those of the shares."""
+        read = (value for part in (self, *self.shares) for value in part.data.values() if isinstance(value, Volume))
+        return tuple({table.digest: table for table in read}.values())
 
     @property
     def tangents(self) -> bool:
@@ -129,6 +188,13 @@ class Draw:
         world = self.instance.mesh.positions @ self.world_from_object[:3, :3].T + self.world_from_object[:3, 3]
         clip: Array = world @ self.clip_from_world[:, :3].T + self.clip_from_world[:, 3]
         return clip
+
+    @cached_property
+    def identities(self) -> NDArray[Any]:
+        """Rows (V, C) that are equal for vertices at the same position, whatever their other attributes are."""
+        # The sum makes 0 of -0, which is the same position.
+        result: NDArray[Any] = self.instance.mesh.positions + 0.0
+        return result
 
     @cached_property
     def world_terms(self) -> Array:
@@ -151,7 +217,7 @@ class Draw:
 def draw_of(scene: Scene, assembly: Assembly, instance: Instance) -> Draw:
     """Returns the inputs of one instance, with the clip matrix of the whole picture. Errors: AssetError."""
     clip = wide(assembly.view.clip_from_world(zero_to_one=True))
-    return placed(scene, assembly, instance, clip, {})
+    return placed(scene, assembly, instance, clip, Shared())
 
 
 def wide(value: Any) -> Array:
@@ -159,14 +225,14 @@ def wide(value: Any) -> Array:
     return rounded(value).astype(np.float64)
 
 
-def placed(scene: Scene, assembly: Assembly, instance: Instance, clip: Array, samplers: dict[Texels, Sampler]) -> Draw:
+def placed(scene: Scene, assembly: Assembly, instance: Instance, clip: Array, shared: Shared) -> Draw:
     """Returns the inputs of one instance.
 
     clip: clip matrix (4, 4), as in `Draw.clip_from_world`.
-    samplers: textures that have been read already; the textures that are read here are added.
+    shared: textures and lights that are known already; those that are read here are added.
     Errors: AssetError.
     """
-    view, material = assembly.view, instance.material
+    view, material, samplers = assembly.view, instance.material, shared.samplers
     world_from_object = instance.world_from_object.copy()
     world_from_object[:3, 3] -= view.eye
     parameters, textures, channels = {}, {}, {}
@@ -190,12 +256,15 @@ def placed(scene: Scene, assembly: Assembly, instance: Instance, clip: Array, sa
         channels["occlusion"] = CHANNELS.index(material.occlusion.channel)
     lamps: list[Lamp] = []
     surrounds: list[Lamp] = []
-    for light in chosen:
+    for index, light in zip(instance.lights, chosen, strict=True):
         if not light.ignores_normal:
-            uploaded = light_values(light, view.eye, scene.film.exposure)
-            values = {name: value.astype(np.float64) for name, value in uploaded.items()}
-            lamp = Lamp(type(light), getattr(light, "falloff", "none"), values)
-            (surrounds if light.omnidirectional else lamps).append(lamp)
+            if index not in shared.lamps:
+                shared.lamps[index] = _lamp(light, view.eye, scene.film.exposure)
+            (surrounds if light.omnidirectional else lamps).append(shared.lamps[index])
+    if instance.shares:
+        shares = tuple(placed(scene, assembly, part, clip, shared) for part in instance.parts)
+    else:
+        shares = ()
     triangles = instance.mesh.triangles.astype(np.intp)
     if material.alpha_mode == "blend":
         # Blended triangles are drawn back to front.
@@ -228,7 +297,16 @@ def placed(scene: Scene, assembly: Assembly, instance: Instance, clip: Array, sa
         turn=wide(direction(material)),
         alpha=float(rounded(material.alpha)),
         alpha_cutoff=float(rounded(material.alpha_cutoff)),
+        data=material.data() if lamps else {},
+        shares=shares,
+        weights=None if instance.weights is None else wide(instance.weights),
     )
+
+
+def _lamp(light: Light, eye: Array, exposure: float) -> Lamp:
+    """Returns a light with the values that are uploaded. eye: position of the viewer (3,) [scene units]. exposure: [stops]."""
+    values = {name: value.astype(np.float64) for name, value in light_values(light, eye, exposure).items()}
+    return Lamp(type(light), getattr(light, "falloff", "none"), values)
 
 
 def _sampler(material: Brdf, key: str, samplers: dict[Texels, Sampler]) -> Sampler:

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from glshade.arrays import rounded
-from glshade.textures.mipmap import levels
+from glshade.image.srgb import srgb_to_linear
+from glshade.textures.storage import Float, Srgb8, Stored
 from glshade.textures.texels import Texels
 from glshade.textures.texture import UNPLACED, Filter, Placement, WrapMode
 
@@ -32,6 +34,7 @@ class Sampler:
     """A texture with its L mipmap levels in one array.
 
     texels: the texels of all levels (N, 4) float32, one level after the other, each from its bottom row to its top row.
+    codes: the 8-bit sRGB codes (N, 3) from which a driver decodes the texels' colours; None for texels that are stored linear.
     starts: index of each level's first texel (L,).
     widths: width of each level (L,) [texels].
     heights: height of each level (L,) [texels].
@@ -40,9 +43,11 @@ class Sampler:
     filter: how texels are filtered where the picture is magnified.
     placement: the rows (2, 3) of the matrix from a mesh's texture coordinates (u, v, 1) to the picture's, rounded to float32;
         None where the two are the same.
+    decoding: the error with which a driver decodes the codes [codes].
     """
 
     texels: NDArray[np.float32]
+    codes: NDArray[np.uint8] | None
     starts: NDArray[np.intp]
     widths: NDArray[np.intp]
     heights: NDArray[np.intp]
@@ -50,23 +55,56 @@ class Sampler:
     span: tuple[int, int] = (1, 1)
     filter: Filter = "smooth"
     placement: Array | None = None
+    decoding: float = 0.0
 
     @classmethod
     def load(cls, given: Texels) -> Sampler:
-        """Returns the texture of a picture file. Errors: AssetError."""
+        """Returns the texture of a picture. Errors: AssetError."""
         return replace(cls._of(given.read(), given.wrap, given.span), filter=given.filter)
 
     @classmethod
     def of(cls, pixels: NDArray[np.float32], wrap: tuple[WrapMode, WrapMode]) -> Sampler:
         """Returns the texture of a picture (H, W, 4) whose row 0 is the top row. v = 0 is the bottom of the picture."""
-        return cls._of(np.ascontiguousarray(pixels[::-1]), wrap, (1, 1))
+        return cls._of(Stored.of(np.ascontiguousarray(pixels[::-1]), Float(4), "RGBA"), wrap, (1, 1))
 
     @classmethod
-    def _of(cls, pixels: NDArray[np.float32], wrap: tuple[WrapMode, WrapMode], span: tuple[int, int]) -> Sampler:
-        chain = list(levels(pixels))
-        heights, widths = (np.array([level.shape[axis] for level in chain]) for axis in (0, 1))
+    def _of(cls, stored: Stored, wrap: tuple[WrapMode, WrapMode], span: tuple[int, int]) -> Sampler:
+        heights, widths = (np.array([level.shape[axis] for level in stored.levels]) for axis in (0, 1))
         starts = np.concatenate([[0], np.cumsum(heights * widths)[:-1]])
-        return cls(np.concatenate([level.reshape(-1, 4) for level in chain]), starts, widths, heights, wrap, span)
+        texels = np.concatenate([level.reshape(-1, 4) for level in stored.decoded()])
+        codes = None
+        if isinstance(stored.format, Srgb8):
+            colours = ["RGB".index(source) for source in stored.swizzle[:3]]
+            codes = np.concatenate([level.reshape(-1, stored.format.channels)[:, colours] for level in stored.levels])
+        return cls(texels, codes, starts, widths, heights, wrap, span)
+
+    def decoded(self, values: Sequence[float], error: float) -> Sampler:
+        """Returns the texture as a driver reads it.
+
+        values: the linear value of each sRGB code for this driver; none if they are not known.
+        error: the error with which the driver decodes codes, if `values` are not known [codes].
+        """
+        if self.codes is None:
+            return self
+        if not len(values):
+            return replace(self, decoding=error)
+        texels = self.texels.copy()
+        texels[:, :3] = np.array(values, dtype=np.float32)[self.codes]
+        return replace(self, texels=texels)
+
+    @cached_property
+    def extremes(self) -> tuple[Sampler, Sampler]:
+        """The texture with colours as dark, and as bright, as the error of their decoding allows."""
+        assert self.codes is not None
+        codes = np.arange(256.0)
+        found = []
+        for error in (-self.decoding, self.decoding):
+            # Beyond the last code the curve goes on.
+            shifted = srgb_to_linear(np.maximum(codes + error, 0) / 255)
+            texels = self.texels.copy()
+            texels[:, :3] = shifted[self.codes]
+            found.append(replace(self, texels=texels, decoding=0.0))
+        return found[0], found[1]
 
     def placed(self, placement: Placement) -> Sampler:
         """Returns the texture, placed on the mesh by a matrix. placement: the rows of the matrix, from `Picture.placement`."""

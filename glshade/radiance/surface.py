@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from glshade.arrays import unit_and_length
 from glshade.lights import FALLOFFS
 from glshade.radiance.draw import Draw, Lamp
+from glshade.radiance.joined_draw import JoinedDraw
 from glshade.radiance.sampler import Sampler
 
 Array = NDArray[Any]
@@ -36,6 +37,7 @@ class Surface:
     colour: vertex colours, linear Rec. 709, and alpha (N, 4); None where they are not used.
     footprint: changes of uv from a pixel to the next one in its row and in its column, (N, 2) each; None in the vertex stage.
     level: number, or array (N,), that is added to the textures' level of detail.
+    member: the index (N,) of each point's draw in a joined draw; None for the points of a single draw.
     """
 
     side: Array
@@ -46,6 +48,7 @@ class Surface:
     colour: Array | None
     footprint: tuple[Array, Array] | None = None
     level: Any = 0.0
+    member: NDArray[np.intp] | None = None
 
 
 def mapped(surface: Surface, function: Callable[[Array], Array]) -> Surface:
@@ -57,6 +60,11 @@ def mapped(surface: Surface, function: Callable[[Array], Array]) -> Surface:
         return function(value) if isinstance(value, np.ndarray) and value.ndim else value
 
     return replace(surface, **{name: apply(value) for name, value in vars(surface).items()})
+
+
+def by_columns(surface: Surface) -> Surface:
+    """Returns the surface with arrays whose columns are contiguous: NumPy computes with these in a third of the time."""
+    return mapped(surface, np.asfortranarray)
 
 
 def part_of(surface: Surface, which: slice | NDArray[np.intp]) -> Surface:
@@ -85,6 +93,8 @@ def at_vertices(draw: Draw, which: NDArray[np.intp], dtype: Any, centroids: bool
     dtype: NumPy type of the result.
     centroids: whether the points are the centroids of faces, which are stored with the vertices of faceted meshes.
     """
+    if isinstance(draw, JoinedDraw):
+        return part_of(_at_members(draw, dtype, centroids), which)
     mesh = draw.instance.mesh
     place = mesh.centroids if centroids and mesh.centroids is not None else mesh.positions
     linear = draw.world_from_object[:3, :3].astype(dtype)
@@ -106,6 +116,33 @@ def at_vertices(draw: Draw, which: NDArray[np.intp], dtype: Any, centroids: bool
     return Surface(np.ones(len(position), dtype=dtype), position, normal, tangent, uv, colour)
 
 
+def _at_members(draw: JoinedDraw, dtype: Any, centroids: bool) -> Surface:
+    """Returns the surface at all vertices of a joined draw. dtype, centroids: as for `at_vertices`."""
+    key = dtype, centroids
+    if key not in draw.kept:
+        corners = draw.corners
+        ends = np.searchsorted(corners.member, np.arange(len(corners.members) + 1))
+        parts = [
+            at_vertices(member, corners.vertex[ends[k] : ends[k + 1]], dtype, centroids)
+            for k, member in enumerate(corners.members)
+        ]
+        draw.kept[key] = replace(joined(parts), level=0.0, member=corners.member)
+    found: Surface = draw.kept[key]
+    return found
+
+
+def _own(value: Any, surface: Surface, columns: tuple[int, ...] = ()) -> Array:
+    """Returns a value of a draw in the surface's number type; for a joined draw with a row for each member, that of each point.
+
+    columns: the shape of the value of one draw.
+    """
+    values = np.asarray(value)
+    if values.ndim > len(columns):
+        assert surface.member is not None
+        values = values[surface.member]
+    return values.astype(surface.position.dtype)
+
+
 def _sampled(sampler: Sampler, surface: Surface) -> Array:
     """Returns the values (N, 4) of a texture at the points."""
     if surface.uv is None:
@@ -117,7 +154,7 @@ def _sampled(sampler: Sampler, surface: Surface) -> Array:
 
 def alpha_of(draw: Draw, surface: Surface) -> Array:
     """Returns the alpha of the points (N,)."""
-    value = np.full(len(surface.position), draw.alpha, dtype=surface.position.dtype)
+    value = np.full(len(surface.position), _own(draw.alpha, surface))
     if draw.alpha_sampler is not None:
         value = value * _sampled(draw.alpha_sampler, surface)[:, 3]
     if surface.colour is not None:
@@ -133,11 +170,12 @@ def material_of(draw: Draw, surface: Surface) -> SimpleNamespace:
     """
     values: dict[str, Array] = {"emission": _emission(draw, surface), "openness": _openness(draw, surface)}
     for name, declared in draw.model.parameters().items():
-        value = draw.parameters[name].astype(surface.position.dtype)
         colour = draw.model.is_colour(name)
+        shape = (3,) if colour else ()
+        value = _own(draw.parameters[name], surface, shape)
         if name in draw.samplers:
             texel = _sampled(draw.samplers[name], surface)
-            value = value * (texel[:, :3] if colour else texel[:, draw.channels[name]]) + draw.added[name].astype(value.dtype)
+            value = value * (texel[:, :3] if colour else texel[:, draw.channels[name]]) + _own(draw.added[name], surface, shape)
             # A texel outside of the parameter's range is clamped to it.
             value = np.clip(value, value.dtype.type(declared.low), declared.high and value.dtype.type(declared.high))
         # Vertex colours multiply the base colour, and a parameter that equals the base colour because it was left out.
@@ -145,16 +183,26 @@ def material_of(draw: Draw, surface: Surface) -> SimpleNamespace:
         if tinted and surface.colour is not None:
             value = value * surface.colour[:, :3]
         values[name] = value
-    return SimpleNamespace(**values, **draw.instance.material.chosen())
+    return SimpleNamespace(**values, **draw.instance.material.chosen(), **draw.data)
+
+
+def repeated(draw: Draw, material: SimpleNamespace, count: int) -> SimpleNamespace:
+    """Returns a material of `material_of` for points that are repeated, all of them `count` times."""
+    columns = {name: 1 if draw.model.is_colour(name) else 0 for name in draw.model.parameters()}
+    values = dict(vars(material))
+    for name, own in {**columns, "emission": 1, "openness": 1}.items():
+        if values[name].ndim > own:
+            values[name] = np.concatenate([values[name]] * count)
+    return SimpleNamespace(**values)
 
 
 def _emission(draw: Draw, surface: Surface) -> Array:
     """Returns the light, (3,) or (N, 3), that the points emit. Texels below 0 count as 0."""
-    emission = draw.emission.astype(surface.position.dtype)
+    emission = _own(draw.emission, surface, (3,))
     if "emission" not in draw.samplers:
         return emission
     texel = _sampled(draw.samplers["emission"], surface)[:, :3]
-    result: Array = np.maximum(emission * texel + draw.added["emission"].astype(emission.dtype), 0)
+    result: Array = np.maximum(emission * texel + _own(draw.added["emission"], surface, (3,)), 0)
     return result
 
 
@@ -164,7 +212,7 @@ def _openness(draw: Draw, surface: Surface) -> Array:
     if "occlusion" not in draw.samplers:
         return np.ones(1, dtype=dtype)
     texel = _sampled(draw.samplers["occlusion"], surface)[:, draw.channels["occlusion"], None]
-    result: Array = 1 + dtype.type(draw.occlusion) * (np.clip(texel, 0, 1) - 1)
+    result: Array = 1 + _own(draw.occlusion, surface)[..., None] * (np.clip(texel, 0, 1) - 1)
     return result
 
 
@@ -186,14 +234,14 @@ def _frame(draw: Draw, surface: Surface) -> tuple[Array, Array, Array]:
     n = side * n
     if draw.normal_map is not None:
         x, y, z = (2 * _sampled(draw.normal_map, surface)[:, :3] - 1).T[..., None]
-        n = _unit(draw.normal_scale * (x * t + y * b) + z * n)
+        n = _unit(_own(draw.normal_scale, surface)[..., None] * (x * t + y * b) + z * n)
         t = _unit(_without(t, n))
         b = _unit(_without(_without(b, n), t))
     if draw.directions is not None:
         d = 2 * _sampled(draw.directions, surface)[:, :2] - 1
         along = np.array([1.0, 0.0], dtype=d.dtype)
         t, b = _turned(t, b, _unit(np.where(np.linalg.norm(d, axis=1, keepdims=True) > NO_DIRECTION, d, along)))
-    return (*_turned(t, b, draw.turn.astype(t.dtype)[None]), n)
+    return (*_turned(t, b, np.atleast_2d(_own(draw.turn, surface, (2,)))), n)
 
 
 def _turned(t: Array, b: Array, direction: Array) -> tuple[Array, Array]:
@@ -219,13 +267,37 @@ def evaluate_surface(draw: Draw, surface: Surface, material: SimpleNamespace | N
     """
     if draw.text is not None:
         return draw.text(surface)
-    dtype = surface.position.dtype
     if draw.instance.shows != "light":
         return _property(draw, surface)
+    if draw.shares:
+        return np.asarray(sum(evaluate_surface(share, surface) for share in draw.shares))
+    light = _light(draw, surface, material)
+    return light if draw.weights is None else light @ draw.weights.T.astype(light.dtype)
+
+
+def added_light(draw: Draw, surface: Surface) -> Array:
+    """Returns the sum (N, 3) of the absolute values of the terms that make up the light of a draw with shares; 0 for others.
+
+    The bands of a spectrum add negative light, so that the sum can be much larger than the light itself.
+    """
+    total = np.zeros((len(surface.position), 3), dtype=surface.position.dtype)
+    for share in draw.shares if draw.text is None else ():
+        light = np.abs(_light(share, surface, None))
+        total += light if share.weights is None else light @ np.abs(share.weights).T.astype(light.dtype)
+    return total
+
+
+def _light(draw: Draw, surface: Surface, material: SimpleNamespace | None) -> Array:
+    """Returns the light (N, 3) that the points show to the viewer, before bands of wavelengths become RGB.
+
+    material: as for `evaluate_surface`.
+    """
+    dtype = surface.position.dtype
+    surface = by_columns(surface)
     m = material or material_of(draw, surface)
-    total: Array = np.zeros((len(surface.position), 3), dtype=dtype) + m.emission
+    total: Array = np.zeros((3, len(surface.position)), dtype=dtype).T + m.emission
     if draw.ambient.any():
-        total += m.openness * draw.ambient.astype(dtype) * draw.model.ambient_reflectance(m)
+        total += m.openness * _own(draw.ambient, surface, (3,)) * draw.model.ambient_reflectance(m)
     if not (draw.lamps or draw.surrounds):
         return total
     t, b, n = _frame(draw, surface)
@@ -235,11 +307,11 @@ def evaluate_surface(draw: Draw, surface: Surface, material: SimpleNamespace | N
         return total
 
     def local(direction: Array) -> Array:
-        return np.stack([np.einsum("ij,ij->i", axis, direction) for axis in (t, b, n)], axis=1)
+        return _columns(*(_dot(axis, direction) for axis in (t, b, n)))
 
     v = toward_viewer(draw, surface.position)
     # A visible point faces the viewer, but its interpolated normal may not. So v is mirrored above the horizon.
-    up = 2 * np.maximum(HORIZON - np.einsum("ij,ij->i", n, v), 0)[:, None]
+    up = 2 * np.maximum(HORIZON - _dot(n, v), 0)[:, None]
     v = (v + up * n) / np.sqrt(1 + 2 * HORIZON * up)
     v_local = local(v)
     for lamp in draw.lamps:
@@ -248,12 +320,13 @@ def evaluate_surface(draw: Draw, surface: Surface, material: SimpleNamespace | N
     return total
 
 
-def light_at(draw: Draw, position: Array) -> Array:
-    """Returns the light (N, 3) that arrives at positions (N, 3), as absolute values summed over all lights.
+def light_at(draw: Draw, surface: Surface) -> Array:
+    """Returns the light (N, 3) that arrives at the points, as absolute values summed over all lights.
 
     Light that depends on the normal is counted for that direction of the six axes where it is brightest.
     """
-    total = np.broadcast_to(np.abs(draw.ambient), position.shape).copy()
+    position = surface.position
+    total = np.broadcast_to(np.abs(_own(draw.ambient, surface, (3,))), position.shape).copy()
     axes = np.concatenate([np.eye(3), -np.eye(3)])
     for lamp in draw.surrounds:
         total += np.abs(lamp.kind.illuminate(lamp.fields(np.float64), axes)).max(axis=0)
@@ -290,9 +363,20 @@ def _unit(x: Array) -> Array:
     return unit_and_length(x)[0]
 
 
+def _columns(*columns: Array) -> Array:
+    """Returns the array (N, C) of C columns (N,), which stay contiguous."""
+    return np.stack(columns).T
+
+
+def _dot(a: Array, b: Array) -> Array:
+    """Returns the dot products (N,) of vectors (N, 3)."""
+    result: Array = a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+    return result
+
+
 def _without(x: Array, n: Array) -> Array:
     """Returns the vectors x (N, 3) without their components along n (N, 3)."""
-    result: Array = x - n * np.einsum("ij,ij->i", n, x)[:, None]
+    result: Array = x - n * _dot(n, x)[:, None]
     return result
 
 
@@ -305,4 +389,4 @@ def _any_tangents(n: Array) -> tuple[Array, Array]:
     sign = np.copysign(np.ones_like(z), z)
     a = -1 / (sign + z)
     c = x * y * a
-    return np.stack([1 + sign * x * x * a, sign * c, -sign * x], axis=1), np.stack([c, sign + y * y * a, -y], axis=1)
+    return _columns(1 + sign * x * x * a, sign * c, -sign * x), _columns(c, sign + y * y * a, -y)

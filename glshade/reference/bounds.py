@@ -9,33 +9,40 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, fields, replace
-from itertools import product
+from functools import partial
+from itertools import islice, product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from glshade.radiance.draw import Draw
+from glshade.radiance.sampler import Sampler
 from glshade.radiance.surface import (
     Surface,
+    added_light,
     alpha_of,
     at_vertices,
+    by_columns,
     evaluate_surface,
     joined,
     light_at,
     mapped,
     material_of,
     part_of,
+    repeated,
     toward_viewer,
 )
+from glshade.reference.division import by_structure
 from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.inputs import Inputs
 from glshade.reference.interpolate import blend, weights
 from glshade.reference.patches import GRID_LINES, TRIANGLE_LINES, Range, light_range, on_grid, on_triangles
 from glshade.reference.planes import Planes
 from glshade.reference.raster import Fragments, U
-from glshade.reference.shade import AT_CENTRE, by_draw, places, surface_at
+from glshade.reference.shade import AT_CENTRE, places, surface_at
 from glshade.reference.slivers import slimness
+from glshade.textures.volume import Volume
 
 Array = NDArray[Any]
 Flags = NDArray[np.bool_]
@@ -76,6 +83,8 @@ SMALL = 0.75
 # A triangle with at least this height has attributes that do not change by more than from corner to corner in a pixel, so that
 # they may be extrapolated over the pixels at its border [pixels].
 BROAD = 1.0
+# Surfaces of fewer points are evaluated together, up to this many points at once.
+TOGETHER = 1 << 13
 # The number of times that the search for the brightest and the darkest point of the box follows each axis.
 CLIMBS = 2
 
@@ -89,7 +98,8 @@ class Bounds:
     above: the largest increase (N, 3) of the light that the errors of the attributes can cause.
     level: the part (N, 3) of below and above that comes from the level of detail of textures.
     rounding: the largest difference (N, 3) that was found between the light computed in float32 and in float64.
-    magnitude: the absolute value (N, 3) of the light. With more than SUMMED lights it is multiplied by their number / SUMMED.
+    magnitude: the absolute value (N, 3) of the light, or the sum of those of its terms where bands of wavelengths are added.
+        With more than SUMMED lights it is multiplied by their number / SUMMED.
     arriving: the absolute value (N, 3) of the light that arrives at the surface from all lights.
     alpha: alpha (N,), computed in float64.
     alpha_low: the least possible alpha (N,).
@@ -146,7 +156,7 @@ def alphas(
         pixel's centre.
     """
     result = np.ones((3, len(fragments)))
-    for draw, indices, part in by_draw(inputs, fragments):
+    for draw, indices, part in by_structure(inputs, fragments):
         if draw.alpha_mode != "opaque":
             for which, extent in _places(indices, anywhere, inputs.extent):
                 pieces = part.take(which)
@@ -165,7 +175,7 @@ def fragment_bounds(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVM
     anywhere: as for `alphas`.
     """
     result = Bounds.empty(len(fragments))
-    for draw, indices, part in by_draw(inputs, fragments):
+    for draw, indices, part in by_structure(inputs, fragments):
         for which, extent in _places(indices, anywhere, inputs.extent):
             limits = _limits(draw, part.take(which), inputs.size, driver, extent)
             for name, values in limits.items():
@@ -216,6 +226,7 @@ class _Errors:
 
     level: the least and the largest number (N,) to add to the level of detail.
     share: for attributes that are not known in a square, the largest ratio (N,) of a driver's error to half of the range.
+    table: the error of the weights of the filter that reads the model's tables [texels].
     """
 
     position: Array | None = None
@@ -225,6 +236,7 @@ class _Errors:
     colour: Array | None = None
     level: tuple[Array, Array] | None = None
     share: Array | None = None
+    table: float = 0.0
 
 
 def _attributes(draw: Draw, fragments: Fragments, planes: Planes, driver: Freedom, extent: float) -> tuple[Surface, _Errors]:
@@ -277,7 +289,7 @@ def _attributes(draw: Draw, fragments: Fragments, planes: Planes, driver: Freedo
             errors["uv"] = errors["uv"] + driver.texel * largest_texel
         errors["uv"] = errors["uv"] + _placing(draw, surface, driver)
         errors["level"] = _levels(draw, fragments, surface, planes.size, driver)
-    return replace(surface, **middles), _Errors(**errors)
+    return replace(surface, **middles), _Errors(**errors, table=driver.table)
 
 
 def _vertex_errors(draw: Draw, surface: Surface, vertices: NDArray[np.intp], driver: Freedom) -> _Errors:
@@ -288,14 +300,13 @@ def _vertex_errors(draw: Draw, surface: Surface, vertices: NDArray[np.intp], dri
     vertices: the indices (N,) of the vertices in the mesh.
     driver: the errors of the driver's fixed functions.
     """
-    matrix = np.abs(draw.world_from_object)
-    world = np.abs(draw.instance.mesh.positions[vertices]) @ matrix[:3, :3].T + matrix[:3, 3]
     unit = np.full(surface.normal.shape, UNIT) if draw.lamps or draw.surrounds else None
     return _Errors(
-        position=driver.window * U * world if _positions_matter(draw) else None,
+        position=driver.window * U * draw.world_terms[vertices] if _positions_matter(draw) else None,
         normal=unit,
         tangent=unit if surface.tangent is not None else None,
         uv=_coordinates(draw, surface, driver),
+        table=driver.table,
     )
 
 
@@ -428,11 +439,11 @@ def _over_patches(
         points = on_triangles(draw, fragments.take(part), part_of(surface, part))
         found = light_range(draw, points, TRIANGLE_LINES, narrowed)
         found = Range(*(getattr(found, f.name)[group.reshape(-1)] for f in fields(Range)))
-        add(tiny, _ranged(draw, part_of(surface, tiny), _share(errors, tiny), found))
+        add(tiny, _ranged(draw, part_of(surface, tiny), _share(errors, tiny), found, errors.table))
     if len(wide):
         points = on_grid(draw, fragments.take(wide), part_of(surface, wide), planes.size, extent, 3, inside=False)
         found = light_range(draw, points, GRID_LINES, narrowed)
-        add(wide, _ranged(draw, part_of(surface, wide), _share(errors, wide), found))
+        add(wide, _ranged(draw, part_of(surface, wide), _share(errors, wide), found, errors.table))
     if len(other):
         add(other, _searched(draw, fragments.take(other), part_of(surface, other), _taken(errors, other), planes.size, extent))
     return result
@@ -445,13 +456,16 @@ def _share(errors: _Errors, which: NDArray[np.intp]) -> Array:
     return result
 
 
-def _ranged(draw: Draw, surface: Surface, share: Array, found: Range) -> dict[str, Array]:
+def _ranged(draw: Draw, surface: Surface, share: Array, found: Range, weight: float) -> dict[str, Array]:
     """Returns the fields of Bounds by name, without those of alpha, for the light's range over patches.
 
     A driver's errors of the attributes change the light by at most their share of the attributes' ranges. An attribute that
     does not change in the square has errors of a few roundings, which count like the roundings of the shading.
+    weight: the error of the weights of the filter that reads the model's tables [texels].
     """
     room = share * (found.high - found.low) + AGAIN * found.rounding
+    if draw.tables:
+        room += np.maximum(*_read_beside(draw, evaluate_surface, surface, evaluate_surface(draw, surface), weight))
     value, half = (found.low + found.high) / 2, (found.high - found.low) / 2 + room
     return {
         "value": value,
@@ -459,8 +473,8 @@ def _ranged(draw: Draw, surface: Surface, share: Array, found: Range) -> dict[st
         "above": half,
         "level": np.zeros_like(value),
         "rounding": found.rounding,
-        "arriving": light_at(draw, surface.position),
-        "magnitude": np.abs(value) * max(1.0, len(draw.lamps + draw.surrounds) / SUMMED),
+        "arriving": light_at(draw, surface),
+        "magnitude": _magnitude(draw, surface, value),
     }
 
 
@@ -486,7 +500,7 @@ def _per_vertex(draw: Draw, fragments: Fragments, planes: Planes, extent: float)
             at = values[place].max(axis=1) if extent else blend(by, values[place])
             result.setdefault(name, np.zeros((len(fragments), 3)))[indices] = at
         # Triangles that show only the other side get meaningless plane equations here; their errors are not used.
-        table = np.zeros((len(draw.instance.mesh.positions), 3))
+        table = np.zeros((len(draw.clip), 3))
         table[vertices] = limits["value"]
         if extent:
             middle, half, error = planes.over_square(table[planes.corners], 0.0, extent)
@@ -533,6 +547,7 @@ def _spread(
     patch: optional, for errors as large as a pixel; a function that yields the true points of some fragments on a square grid.
         Where the light is curved, these tell more than the corners of the errors' boxes.
     """
+    surface = by_columns(surface)
     material = material_of(draw, surface)
     value = evaluate(draw, surface, material)
     below, above = np.zeros_like(value), np.zeros_like(value)
@@ -568,8 +583,14 @@ def _spread(
         light = np.stack(_evaluated(draw, evaluate, _in_all_texels(part_of(surface, beside), _taken(errors, beside))))
         below[beside] += np.maximum(value[beside] - light.min(axis=0), 0)
         above[beside] += np.maximum(light.max(axis=0) - value[beside], 0)
+    if draw.tables:
+        less, more = _read_beside(draw, evaluate, surface, value, errors.table)
+        below += less
+        above += more
     if errors.colour is not None and surface.colour is not None:
         widen([evaluate(draw, replace(surface, colour=surface.colour + sign * errors.colour)) for sign in (-1, 1)])
+    for ends in _decoded(draw):
+        widen([evaluate(end, surface) for end in ends])
     level = np.zeros_like(value)
     if errors.level is not None:
         offsets = _spaced(*errors.level, LEVELS)
@@ -583,9 +604,54 @@ def _spread(
         "above": above,
         "level": level,
         "rounding": rounding,
-        "arriving": light_at(draw, surface.position),
-        "magnitude": np.abs(value) * max(1.0, len(draw.lamps + draw.surrounds) / SUMMED),
+        "arriving": light_at(draw, surface),
+        "magnitude": _magnitude(draw, surface, value),
     }
+
+
+def _magnitude(draw: Draw, surface: Surface, value: Array) -> Array:
+    """Returns `Bounds.magnitude` (N, 3). value: the light (N, 3)."""
+    size = np.maximum(np.abs(value), added_light(draw, surface)) if draw.shares else np.abs(value)
+    result: Array = size * max(1.0, len(draw.lamps + draw.surrounds) / SUMMED)
+    return result
+
+
+def _read_beside(
+    draw: Draw, evaluate: Callable[..., Array], surface: Surface, value: Array, weight: float
+) -> tuple[Array, Array]:
+    """Returns how much less and how much more light, (N, 3) each, a driver may show because of how it reads the model's tables.
+
+    The coordinates round relative to the whole side of a table. Filtered values have a kink at the middle of every texel, so
+    the ends of the error are not enough.
+    draw, evaluate, surface: as in _spread.
+    value: the light (N, 3) that the exact tables give.
+    weight: the error of the filter's weights [texels].
+    """
+    below, above = np.zeros_like(value), np.zeros_like(value)
+    for table in draw.tables:
+        for axis, count in enumerate(table.size):
+            step = (weight + 4 * U * count) * (np.arange(3) == axis)
+
+            def moved(read: Volume, by: Array, digest: str = table.digest) -> Volume:
+                return replace(read, shift=tuple(by)) if read.digest == digest else read
+
+            ends = [evaluate(draw.with_tables(partial(moved, by=sign * step)), surface) for sign in (-1.0, 1.0)]
+            margin = _between([ends[0], value, ends[1]])
+            below += np.maximum(value - np.minimum.reduce(ends) + margin, 0)
+            above += np.maximum(np.maximum.reduce(ends) - value + margin, 0)
+    return below, above
+
+
+def _decoded(draw: Draw) -> Iterator[tuple[Draw, ...]]:
+    """Yields, for each texture of sRGB codes whose decoding has an error, the draw with that texture darkest and brightest."""
+    every = (sampler for part in (draw, *draw.shares) for sampler in part.samplers.values() if sampler.decoding)
+    for sampler in {id(sampler): sampler for sampler in every}.values():
+        yield tuple(draw.with_samplers(partial(_exchanged, sampler, end)) for end in sampler.extremes)
+
+
+def _exchanged(one: Sampler, other: Sampler, sampler: Sampler) -> Sampler:
+    """Returns the other texture in place of one texture; all others as they are."""
+    return other if sampler is one else sampler
 
 
 def over_box(
@@ -611,7 +677,7 @@ def over_box(
     """
 
     def moved(points: Surface, by: Array) -> Surface:
-        vector = getattr(points, name).copy()
+        vector = getattr(points, name).copy(order="K")
         vector[:, :3] += by
         return replace(points, **{name: vector})
 
@@ -656,13 +722,21 @@ def over_box(
 def _evaluated(draw: Draw, evaluate: Callable[..., Array], surfaces: Iterable[Surface], material: Any = None) -> list[Array]:
     """Returns the light (N, 3) of each of several surfaces with N points.
 
-    A text takes about as long for one point as for a thousand, so that it is run for all surfaces at once.
+    To evaluate a model takes about as long for one point as for a thousand, so that small surfaces are evaluated together. A
+    text takes so long that it is run for all surfaces at once.
     material: optional, the material of all surfaces.
     """
-    if draw.text is None:
-        return [evaluate(draw, surface, material) for surface in surfaces]
-    several = list(surfaces)
-    return list(evaluate(draw, joined(several)).reshape(len(several), -1, 3))
+    light: list[Array] = []
+    several = iter(surfaces)
+    for surface in several:
+        together = TOGETHER // max(len(surface.position), 1)
+        some = [surface, *islice(several, None if draw.text is not None else max(together - 1, 0))]
+        if len(some) == 1:
+            light.append(evaluate(draw, surface, material))
+        else:
+            shared = None if material is None else repeated(draw, material, len(some))
+            light += list(evaluate(draw, joined(some), shared).reshape(len(some), -1, 3))
+    return light
 
 
 def _search(
@@ -773,9 +847,9 @@ def _levels(
 def _taken(errors: _Errors, indices: NDArray[np.intp]) -> _Errors:
     """Returns the errors at the points with these indices."""
     values = {f.name: getattr(errors, f.name) for f in fields(errors)}
-    level = values.pop("level")
+    level, table = values.pop("level"), values.pop("table")
     taken = {name: None if value is None else value[indices] for name, value in values.items()}
-    return _Errors(**taken, level=None if level is None else (level[0][indices], level[1][indices]))
+    return _Errors(**taken, table=table, level=None if level is None else (level[0][indices], level[1][indices]))
 
 
 def _moved(surface: Surface, name: str, axis: int, by: Array) -> Surface:
@@ -803,4 +877,4 @@ def _between(samples: list[Array]) -> Array:
 
 def narrowed(surface: Surface) -> Surface:
     """Returns the surface with all attributes rounded to float32."""
-    return mapped(surface, lambda value: value.astype(np.float32))
+    return mapped(surface, lambda value: value.astype(np.float32) if value.dtype.kind == "f" else value)

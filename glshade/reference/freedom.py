@@ -32,11 +32,15 @@ class Freedom:
         recognised.
     level: the error of the level of detail, below the least and above the largest result of these rules [levels].
     texel: the error of the texture filter's weights [texels]; 0 if it is not larger than that of float32.
+    table: the same for the textures of three dimensions that hold the tables of models [texels].
     clips: whether triangles are clipped at the sides of the view, and not only at the near and far plane.
     subpixel_bits: the number of binary digits below one pixel of the corners' coordinates that decide which pixels a triangle
         covers.
     samples: the largest number of samples per pixel that the driver offers in one picture; 0 if it is not known.
     codes: the error of the conversion from floats to 8-bit codes, between 0.5 and 1 [codes].
+    decoding: the largest error with which the 8-bit sRGB codes of textures are decoded to linear values [codes].
+    decoded: the linear value (256,) of each of these codes, as the driver decodes it. The error needs no allowance where these
+        values are known; none are given where they are not.
     """
 
     name: str = "llvmpipe"
@@ -46,10 +50,13 @@ class Freedom:
     rules: tuple[Rule, ...] = ("length",)
     level: float = 0.05
     texel: float = 0.0
+    table: float = 0.0
     clips: bool = True
     subpixel_bits: int = 8
     samples: int = 4
     codes: float = 0.51
+    decoding: float = 0.4
+    decoded: tuple[float, ...] = ()
 
     @property
     def step(self) -> float:
@@ -62,8 +69,10 @@ class Freedom:
         return self.step * SUBPIXELS + RESERVE
 
     def as_dict(self) -> dict[str, Any]:
-        """Returns the errors in a form that JSON can hold."""
-        return {**asdict(self), "rules": list(self.rules)}
+        """Returns the errors in a form that JSON can hold. `decoding` stands for the values of the sRGB codes."""
+        result = {**asdict(self), "rules": list(self.rules)}
+        del result["decoded"]
+        return result
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> Freedom:
@@ -71,7 +80,7 @@ class Freedom:
 
         Errors: GlshadeError, in one line, where a key is unknown or a value is not allowed.
         """
-        unknown = sorted(set(data) - set(cls.__dataclass_fields__))
+        unknown = sorted(set(data) - (set(cls.__dataclass_fields__) - {"decoded"}))
         if unknown:
             raise GlshadeError(f"freedom.{unknown[0]}: no such property of a driver; remove it")
         try:
@@ -80,7 +89,8 @@ class Freedom:
             first = error.errors()[0]
             place = ".".join(map(str, ("freedom", *first["loc"])))
             raise GlshadeError(f"{place}: {first['msg'][0].lower()}{first['msg'][1:]}, not {first['input']!r}") from None
-        numbers = {name: getattr(found, name) for name in ("plane", "window", "snap", "level", "texel", "codes")}
+        errors = ("plane", "window", "snap", "level", "texel", "table", "codes", "decoding")
+        numbers = {name: getattr(found, name) for name in errors}
         for name, value in numbers.items():
             if not 0 <= value < float("inf"):
                 raise GlshadeError(f"freedom.{name}: must be a finite number from 0, not {value}")
@@ -97,14 +107,17 @@ class Freedom:
 LLVMPIPE = Freedom()
 # The errors that a driver may have that was not measured: corners are snapped to the coarsest grid that OpenGL allows,
 # attributes are interpolated from the corners before or after that, the level of detail is any that the specification allows,
-# texture filters have weights of 8 bits, and a float becomes one of the two codes nearest to it.
+# texture filters have weights of 8 bits, a float becomes one of the two codes nearest to it, and an sRGB code is decoded to a
+# number that is nearer to the code's own than to any other's. (OpenGL does not say how exact the decoding is.)
 UNMEASURED = Freedom(
     "unmeasured",
     snap=2.0**-LEAST_BITS,
     rules=("largest", "sum"),
     level=0.1,
     texel=1 / 256,
+    table=1 / 256,
     subpixel_bits=LEAST_BITS,
     samples=0,
     codes=1.0,
+    decoding=0.5,
 )

@@ -7,7 +7,7 @@ therefore differ.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -18,15 +18,14 @@ from glshade.assembly.assembly import Assembly
 from glshade.assembly.instance import Instance
 from glshade.assembly.part import Part
 from glshade.calibration.calibration import Calibration
-from glshade.glsl.plan import ProgramPlan
-from glshade.glsl.planner import plan_instance
-from glshade.radiance.draw import Draw, placed, wide
+from glshade.glsl.batch import batches
+from glshade.glsl.planner import plans
+from glshade.radiance.draw import Draw, Shared, placed, wide
 from glshade.radiance.readying import ready
 from glshade.radiance.sampler import Sampler
 from glshade.scene.camera import window
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
-from glshade.textures.texels import Texels
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]
@@ -60,6 +59,19 @@ class Inputs:
         x, y, w, h = self.window
         return np.add.outer(np.arange(y, y + h) * self.size[0], np.arange(x, x + w))
 
+    def decoded(self, values: Sequence[float], error: float) -> Inputs:
+        """Returns the values with the textures as a driver reads them. values, error: as for `Sampler.decoded`."""
+        known: dict[int, Sampler] = {}
+
+        def read(sampler: Sampler) -> Sampler:
+            # Several draws share a sampler, and go on sharing it.
+            if id(sampler) not in known:
+                known[id(sampler)] = sampler.decoded(values, error)
+            return known[id(sampler)]
+
+        draws = (draw.with_samplers(read) for draw in self.draws)
+        return replace(self, draws=tuple(draws))
+
     def shifted(self, right: float, down: float) -> Inputs:
         """Returns the values for a picture whose pixels lie farther to the right and farther down [pixels]."""
         clip = wide(window(self.clip_from_world, self.size, right, down, *self.size))
@@ -81,28 +93,27 @@ def prepare(scene: Scene, shading: Rate | None = None, part: Part | None = None)
     width, height = scene.film.size
     whole = assembly.view.clip_from_world(zero_to_one=True)
     clip = wide(window(whole, (width, height), 0, 0, width, height))
-    samplers: dict[Texels, Sampler] = {}
-    draws = (placed(scene, assembly, instance, clip, samplers) for instance in _in_order(assembly))
+    shared = Shared()
+    draws = (placed(scene, assembly, instance, clip, shared) for instance in _in_order(assembly, scene.film.exposure))
     extent = 0.5 if scene.film.samples > 1 else 0.0
     calibration = assembly.calibration(scene)
     return Inputs((width, height), background, tuple(draws), scene.film.window, whole, extent, calibration)
 
 
-def _in_order(assembly: Assembly) -> Iterator[Instance]:
+def _in_order(assembly: Assembly, exposure: float) -> Iterator[Instance]:
     """Opaque instances grouped by program, then blended ones by the mean of their vertices, the farthest first.
 
     The order is that of the GPU renderer: it matters where depths are equal and where surfaces are blended.
     """
-    by_program: dict[ProgramPlan, list[Instance]] = {}
+    first = assembly.first_parts()
+    whole = {id(part): instance for part, instance in zip(first.instances, assembly.instances, strict=True)}
+    for batch in batches(first, plans(first, "linear"), exposure):
+        yield from (whole[id(part)] for part in batch.instances)
     blended: list[tuple[float, Instance]] = []
     for instance in assembly.instances:
         if instance.material.alpha_mode == "blend":
             middle = instance.mesh.positions.mean(axis=0, dtype=np.float64)
             world = instance.world_from_object
             blended.append((float(assembly.view.depth(world[:3, 3] + world[:3, :3] @ middle)), instance))
-        else:
-            by_program.setdefault(plan_instance(instance, assembly, "linear"), []).append(instance)
-    for instances in by_program.values():
-        yield from instances
     for _, instance in sorted(blended, key=lambda item: -item[0]):
         yield instance

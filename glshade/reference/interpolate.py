@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.radiance.draw import Draw
+from glshade.radiance.joined_draw import Corners
 
 Array = NDArray[np.float64]
 
@@ -33,14 +34,19 @@ class Weights:
 
 
 def weights(
-    draw: Draw, triangle: NDArray[Any], x: NDArray[Any], y: NDArray[Any], size: tuple[int, int], derivatives: bool = True
+    draw: Draw | Corners,
+    triangle: NDArray[Any],
+    x: NDArray[Any],
+    y: NDArray[Any],
+    size: tuple[int, int],
+    derivatives: bool = True,
 ) -> Weights:
     """Returns the weights of triangles at points of the picture.
 
     Let p_i be a triangle's corners in homogeneous coordinates. The weights beta_i of a point q make sum(beta_i p_i)
     proportional to q. With the corners moved so that q is the origin, beta_i is the cross product of the other two corners
     (Olano and Greer 1997). This also holds for corners behind the eye.
-    draw: the instance that is drawn.
+    draw: the instance that is drawn, or the corners of several.
     triangle: the rows (N,) of its triangles, one for each point.
     x: the points' x (N,) [pixels]; the centre of pixel i lies at i + 0.5.
     y: the points' y (N,) [pixels]; row 0 is at the top.

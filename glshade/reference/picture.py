@@ -49,7 +49,8 @@ def radiance(
     offset: the distance (right, down) by which all pixels are shifted, for the mean of several pictures [pixels].
     Errors: SceneError.
     """
-    return _shown(prepare(part.scene(scene) if part else scene, shading, part).shifted(*offset), sampling)
+    inputs = prepare(part.scene(scene) if part else scene, shading, part).decoded(sampling.decoded, 0.0)
+    return _shown(inputs.shifted(*offset), sampling)
 
 
 def _shown(inputs: Inputs, sampling: Sampling) -> NDArray[Any]:

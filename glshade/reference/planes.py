@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.radiance.draw import Draw
+from glshade.radiance.joined_draw import Corners
 from glshade.reference import clip
+from glshade.reference.division import by_sides
 from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.inputs import Inputs
 from glshade.reference.raster import SUBPIXELS, Fragments, U
-from glshade.reference.shade import AT_CENTRE, by_draw, places
+from glshade.reference.shade import AT_CENTRE, places
 from glshade.reference.slivers import Clipped, slimness
 
 Array = NDArray[Any]
@@ -62,7 +64,7 @@ def depths(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> 
     slack, slope = np.zeros(len(fragments)), np.zeros((len(fragments), 2))
     low, high = np.zeros(len(fragments)), np.ones(len(fragments))
     cut = np.zeros(len(fragments), dtype=np.bool_)
-    for draw, indices, part in by_draw(inputs, fragments):
+    for draw, indices, part in by_sides(inputs, fragments):
         planes = Planes(draw, part, inputs.size, driver)
         error = planes.depth_error()
         # A triangle that is seen edge-on may have any depth of its corners at a pixel, or be drawn with none at all.
@@ -87,8 +89,8 @@ def depths(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> 
 def may_turn(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> NDArray[np.bool_]:
     """Returns whether each fragment (N,) may show either side, because snapping may turn over its thin triangle."""
     result = np.zeros(len(fragments), dtype=np.bool_)
-    for draw, indices, part in by_draw(inputs, fragments):
-        if draw.instance.back_faces:
+    for draw, indices, part in by_sides(inputs, fragments):
+        if draw.back_faces:
             planes = Planes(draw, part, inputs.size, driver)
             result[indices] = planes.thin[planes.place]
     return result
@@ -133,10 +135,10 @@ class Planes:
     whole: whether (T,) the reference covers pixels by the whole triangle, and does not clip it (raster.py).
     """
 
-    def __init__(self, draw: Draw, fragments: Fragments, size: tuple[int, int], driver: Freedom) -> None:
+    def __init__(self, draw: Draw | Corners, fragments: Fragments, size: tuple[int, int], driver: Freedom) -> None:
         """Computes the plane equations.
 
-        draw: the instance that is drawn.
+        draw: the instance that is drawn, or the corners of several.
         fragments: N fragments of the draw.
         size: width and height of the picture [pixels].
         driver: the errors of the driver's fixed functions.

@@ -7,7 +7,7 @@ holds them and their products exactly for pictures of up to 2^16 pixels a side.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.radiance.draw import Draw
+from glshade.radiance.joined_draw import Corners
 from glshade.reference import clip
 from glshade.reference.inputs import Inputs
 from glshade.reference.interpolate import weights
@@ -93,14 +94,30 @@ class Fragments:
 
 
 def rasterise(inputs: Inputs, margin: float = 0.0) -> Iterator[Fragments]:
-    """Yields all fragments, including hidden ones, draw by draw, in pieces of about 100,000.
+    """Yields all fragments, including hidden ones, in pieces of about 100,000.
+
+    The pieces are in the order of drawing. A piece may hold fragments of several draws: then all of these are blended, or none.
 
     inputs: the scene with its uploaded values.
     margin: 0 for the fragments that cover a pixel's centre; Freedom.margin for every fragment that a driver might draw, at the
         centre or at any other place where the pixel may have samples (Inputs.extent) [1/256 pixel].
     """
-    for number, draw in enumerate(inputs.draws):
-        yield from _rasterise(draw, number, inputs, margin)
+    for first, members in _groups(inputs.draws):
+        yield from _rasterise(members[0] if len(members) == 1 else Corners.whole(members), first, inputs, margin)
+
+
+def _groups(draws: Sequence[Draw]) -> Iterator[tuple[int, Sequence[Draw]]]:
+    """Yields (index of the first draw, draws that follow one another), with at most TRIANGLES triangles or a single draw."""
+    start, size = 0, 0
+    for number, draw in enumerate(draws):
+        more = max(len(draw.triangles), len(draw.instance.mesh.positions))
+        changes = (draw.alpha_mode == "blend") != (draws[start].alpha_mode == "blend")
+        if number > start and (changes or size + more > TRIANGLES):
+            yield start, draws[start:number]
+            start, size = number, 0
+        size += more
+    if draws:
+        yield start, draws[start:]
 
 
 def resolve(inputs: Inputs, parts: Iterable[Fragments], opaque: Callable[[Fragments], Flags]) -> tuple[Fragments, Fragments]:
@@ -109,7 +126,7 @@ def resolve(inputs: Inputs, parts: Iterable[Fragments], opaque: Callable[[Fragme
     There is at most one nearest fragment per pixel, and they are ordered by pixel. Depths are compared as float32. Between
     equal depths, the fragment that is drawn first wins. The blended fragments are ordered by pixel and then in drawing order.
     inputs: the scene with its uploaded values.
-    parts: the fragments, draw by draw.
+    parts: the fragments, as `rasterise` yields them.
     opaque: a function that returns whether each given fragment of a cut-out is kept.
     """
     width, height = inputs.size
@@ -120,8 +137,9 @@ def resolve(inputs: Inputs, parts: Iterable[Fragments], opaque: Callable[[Fragme
     for part in parts:
         mode = modes[part.draw]
         z, before = part.depth.astype(np.float32), depth[part.pixel]
-        # The pieces come draw by draw, but the fragments of one draw are not ordered by triangle.
-        earlier = (part.draw == seen["draw"][part.pixel]) & (part.triangle < seen["triangle"][part.pixel])
+        # The fragments of a piece are not ordered by draw and triangle.
+        draw, triangle = seen["draw"][part.pixel], seen["triangle"][part.pixel]
+        earlier = (part.draw < draw) | ((part.draw == draw) & (part.triangle < triangle))
         near = part.covered & (z > 0) & ((z > before) | ((z == before) & earlier & (mode != "blend")))
         blended = part.take(near & (mode == "blend"))
         if len(blended):
@@ -147,15 +165,22 @@ def resolve(inputs: Inputs, parts: Iterable[Fragments], opaque: Callable[[Fragme
     return nearest, over.take(np.lexsort((over.triangle, over.draw, over.pixel)))
 
 
-def _rasterise(draw: Draw, number: int, inputs: Inputs, margin: float) -> Iterator[Fragments]:
-    """Yields the fragments of one draw.
+def _rasterise(draw: Draw | Corners, first: int, inputs: Inputs, margin: float) -> Iterator[Fragments]:
+    """Yields the fragments of one draw, or of draws that follow one another.
 
-    draw: the instance that is drawn.
-    number: its index into Inputs.draws.
+    draw: the instance that is drawn, or all corners of several.
+    first: the index into Inputs.draws of the first of them.
     inputs: the scene with its uploaded values.
     margin: as for rasterise [1/256 pixel].
     """
     size = inputs.size
+    members = draw.members if isinstance(draw, Corners) else (draw,)
+    counts = np.array([len(member.triangles) for member in members])
+    owner, base = np.repeat(np.arange(len(members)), counts), np.cumsum(counts) - counts
+    mirrored, both = (
+        np.array([member.instance.mirrored for member in members]),
+        np.array([member.back_faces for member in members]),
+    )
     code = clip.outside(draw.clip)
     # Triangles must be clipped if they reach beyond the near or far plane, or beyond the guard band at the sides.
     cut = (clip.outside(draw.clip, clip.GUARDED) != 0) | (code & clip.DEPTH != 0)
@@ -180,12 +205,14 @@ def _rasterise(draw: Draw, number: int, inputs: Inputs, margin: float) -> Iterat
             displaced = np.zeros(len(which))
             if exact is not None:
                 displaced = _displacement(draw.clip_terms[triangles[which]].max(axis=1), exact, size)
-            for index, x, y, covered, partial, front in _cover(polygons, inputs, draw, margin, displaced):
+            member = owner[which + start]
+            faces = mirrored[member], both[member]
+            for index, x, y, covered, partial, front in _cover(polygons, inputs, faces, margin, displaced):
                 triangle = which[index] + start
                 depth = weights(draw, triangle, x + 0.5, y + 0.5, size, derivatives=False).depth
                 yield Fragments(
-                    draw=np.full(len(index), number, dtype=np.int32),
-                    triangle=triangle.astype(np.int32),
+                    draw=(member[index] + first).astype(np.int32),
+                    triangle=(triangle - base[member[index]]).astype(np.int32),
                     pixel=(y * size[0] + x).astype(np.int64),
                     covered=covered,
                     partial=partial,
@@ -223,16 +250,17 @@ def _displacement(terms: Array, corners: Array, size: tuple[int, int]) -> Array:
 
 
 def _cover(
-    polygons: Array, inputs: Inputs, draw: Draw, margin: float, displaced: Array
+    polygons: Array, inputs: Inputs, faces: tuple[Flags, Flags], margin: float, displaced: Array
 ) -> Iterator[tuple[Indices, Indices, Indices, Flags, Flags, Flags]]:
     """Yields (polygon, x, y, covered, partial, front) of the pixels in convex polygons, in batches, ordered by polygon.
 
     polygons: the corners (P, E, 2) of P polygons with E corners each [1/256 pixel].
     inputs: the scene with its uploaded values.
-    draw: the instance that they belong to.
+    faces: whether (P,) each polygon's instance is mirrored, and whether (P,) its back faces are drawn.
     margin: as for rasterise [1/256 pixel].
     displaced: how far (P,) a driver may draw each polygon's corners beside their places, beyond the margin [1/256 pixel].
     """
+    mirrored, back_faces = faces
     margins = margin + displaced
     extent = inputs.extent * SUBPIXELS if margin else 0.0
     following = np.roll(polygons, -1, axis=1)
@@ -242,14 +270,12 @@ def _cover(
     area = (rays[:, :-1, 0] * rays[:, 1:, 1] - rays[:, :-1, 1] * rays[:, 1:, 0]).sum(axis=1)
     length = np.hypot(across, down)
     # y points down in the picture, so polygons that are counter-clockwise in space have a negative area.
-    front = (area < 0) != draw.instance.mirrored
-    drawn = area != 0
-    if not draw.instance.back_faces:
-        drawn &= front
+    front = (area < 0) != mirrored
+    drawn = (area != 0) & (front | back_faces)
     if margin:
         # A triangle lower than two snapping steps may turn over, or gain an area, when a corner moves by one step.
         thin = np.abs(area) <= (2 * (margin - RESERVE) + displaced) * length.max(axis=1)
-        front |= thin & (not draw.instance.back_faces)
+        front |= thin & ~back_faces
         drawn |= thin
     reach = (margins + extent)[:, None]
     low = np.ceil((polygons.min(axis=1) - reach - HALF) / SUBPIXELS)

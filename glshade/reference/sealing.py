@@ -8,6 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from glshade.radiance.draw import Draw
+from glshade.radiance.joined_draw import Corners
+from glshade.reference.division import by_sides
 from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.inputs import Inputs
 from glshade.reference.planes import FLAT, Planes
@@ -32,15 +34,11 @@ def sheets(inputs: Inputs, fragments: Fragments, driver: Freedom = LLVMPIPE) -> 
     """
     owners, twins, possible, edges = [], [], [], []
     count = 0
-    for number, draw in enumerate(inputs.draws):
-        indices = np.flatnonzero(fragments.draw == number)
-        if not len(indices):
-            continue
-        part = fragments.take(indices)
+    for number, (draw, indices, part) in enumerate(by_sides(inputs, fragments, whole=True)):
         planes = Planes(draw, part, inputs.size, driver)
         near, certain = _near(planes, inputs.extent)
         # Each fragment takes part with the facing that it shows, and with the other one if it may be turned over.
-        turned = np.flatnonzero(planes.thin[planes.place]) if draw.instance.back_faces else np.empty(0, dtype=np.intp)
+        turned = np.flatnonzero(planes.thin[planes.place]) if draw.back_faces else np.empty(0, dtype=np.intp)
         which = np.concatenate([np.arange(len(part)), turned])
         twin = np.full(len(which), -1)
         twin[turned], twin[len(part) :] = len(part) + np.arange(len(turned)), turned
@@ -88,7 +86,7 @@ def _near(planes: Planes, extent: float) -> tuple[Flags, Flags]:
     return near, near.any(axis=1) & ~border & ~planes.flat
 
 
-def _edges(draw: Draw, planes: Planes, pixel: Indices, near: Flags, which: Indices, front: Flags) -> Indices:
+def _edges(draw: Draw | Corners, planes: Planes, pixel: Indices, near: Flags, which: Indices, front: Flags) -> Indices:
     """Returns a row (holder, direction, pixel, one end, other end) for each near edge of each of M participants.
 
     pixel: the pixel (N,) of each fragment.
@@ -97,8 +95,7 @@ def _edges(draw: Draw, planes: Planes, pixel: Indices, near: Flags, which: Indic
     front: the facing (M,) of each participant.
     """
     vertices, place = np.unique(planes.corners, return_inverse=True)
-    # Vertices at the same position are the same corner, whatever their other attributes are.
-    _, position_id = np.unique(draw.instance.mesh.positions[vertices] + 0.0, axis=0, return_inverse=True)
+    _, position_id = np.unique(draw.identities[vertices], axis=0, return_inverse=True)
     corner = position_id.reshape(-1)[place.reshape(-1, 3)][planes.place]
     rows = []
     for k in range(3):
@@ -122,11 +119,12 @@ def _closed(edges: Indices, twin: Indices, possible: Flags) -> Flags:
     """
     holder, direction, edge = edges.T
     kept = possible.copy()
+    here, beyond = 2 * edge + direction, 2 * edge + 1 - direction
+    count = 2 * int(edge.max(initial=-1)) + 2
     while True:
         current = kept[holder]
-        number = np.zeros((int(edge.max(initial=-1)) + 1, 2), dtype=np.intp)
-        np.add.at(number, (edge[current], direction[current]), 1)
-        others = number[edge, 1 - direction] - ((twin >= 0) & kept[twin])[holder]
+        number = np.bincount(here[current], minlength=count)
+        others = number[beyond] - ((twin >= 0) & kept[twin])[holder]
         lonely = current & (others <= 0)
         if not lonely.any():
             return kept
@@ -139,17 +137,21 @@ def _connected(edges: Indices, twin: Indices, kept: Flags) -> Indices:
     edges, twin: as for `_closed`.
     kept: whether (M,) the participant is sealed. The others connect nothing.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     holder, _, edge = edges[kept[edges[:, 0]]].T
     pair = np.flatnonzero((twin >= 0) & kept & kept[twin])
     # Each edge is a node beside the participants that hold it.
-    count = len(twin) + int(edges[:, 2].max(initial=-1)) + 1
     first, second = np.concatenate([holder, pair]), np.concatenate([len(twin) + edge, twin[pair]])
-    graph = coo_array((np.ones(len(first), dtype=np.int8), (first, second)), shape=(count, count))
-    result: Indices = connected_components(graph, directed=False)[1][: len(twin)]
-    return result
+    # Every node takes the least number among those that it is connected to, until no number changes. Few steps are enough,
+    # because a part of a surface lies within one pixel. To import SciPy for this would take longer than most calls.
+    number = np.arange(len(twin) + int(edges[:, 2].max(initial=-1)) + 1)
+    while len(apart := np.flatnonzero(number[first] != number[second])):
+        first, second = first[apart], second[apart]
+        least = np.minimum(number[first], number[second])
+        for node in (first, second):
+            np.minimum.at(number, number[node], least)
+        while (number[number] != number).any():
+            number = number[number]
+    return number[: len(twin)]
 
 
 def _numbered(rows: Indices) -> Indices:

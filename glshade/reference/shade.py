@@ -14,14 +14,12 @@ from numpy.typing import NDArray
 
 from glshade.radiance.draw import Draw
 from glshade.radiance.surface import Surface, alpha_of, at_vertices, evaluate_surface, toward_viewer
+from glshade.reference.division import by_structure
 from glshade.reference.inputs import Inputs
 from glshade.reference.interpolate import blend, weights
 from glshade.reference.raster import Fragments
 
 Array = NDArray[Any]
-
-# The number of fragments that are shaded at once. Their arrays then fit into the processor's caches.
-PIECE = 1 << 15
 
 
 @dataclass(frozen=True)
@@ -31,11 +29,13 @@ class Sampling:
     offset: the sample's distance from the pixel's centre, (right, down) [pixels].
     level: a number that is added to the level of detail of textures.
     dtype: the precision of the vertex stage and of all steps after the interpolation.
+    decoded: the linear value (256,) of each sRGB code of textures, as a driver decodes it; by default, the exact value.
     """
 
     offset: tuple[float, float] = (0.0, 0.0)
     level: float = 0.0
     dtype: Any = np.float64
+    decoded: tuple[float, ...] = ()
 
 
 AT_CENTRE = Sampling()
@@ -49,7 +49,7 @@ def shade_fragments(inputs: Inputs, fragments: Fragments, sampling: Sampling = A
     sampling: where and how precisely they are shaded.
     """
     result = np.zeros((len(fragments), 4), dtype=sampling.dtype)
-    for draw, indices, part in by_draw(inputs, fragments):
+    for draw, indices, part in by_structure(inputs, fragments):
         light = _RATES[draw.instance.rate](draw, part, inputs.size, sampling)
         if draw.alpha_mode == "blend":
             alpha = alpha_of(draw, surface_at(draw, part, inputs.size, sampling))[:, None]
@@ -64,7 +64,7 @@ def opacity(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTRE
     cutoff.
     """
     result = np.ones(len(fragments), dtype=sampling.dtype)
-    for draw, indices, part in by_draw(inputs, fragments):
+    for draw, indices, part in by_structure(inputs, fragments):
         if draw.alpha_mode != "opaque":
             result[indices] = alpha_of(draw, surface_at(draw, part, inputs.size, sampling))
     return result
@@ -75,16 +75,6 @@ def is_there(inputs: Inputs, fragments: Fragments, sampling: Sampling = AT_CENTR
     cutoff = np.array([draw.alpha_cutoff if draw.alpha_mode == "mask" else -np.inf for draw in inputs.draws])
     kept: NDArray[np.bool_] = opacity(inputs, fragments, sampling) >= cutoff[fragments.draw].astype(sampling.dtype)
     return kept
-
-
-def by_draw(inputs: Inputs, fragments: Fragments) -> Any:
-    """Yields (draw, indices of some of its fragments, these fragments), with at most PIECE fragments at a time."""
-    order = np.argsort(fragments.draw, kind="stable")
-    bounds = np.searchsorted(fragments.draw[order], np.arange(len(inputs.draws) + 1))
-    for draw, first, end in zip(inputs.draws, bounds[:-1], bounds[1:], strict=True):
-        for start in range(first, end, PIECE):
-            which = order[start : min(start + PIECE, end)]
-            yield draw, which, fragments.take(which)
 
 
 def _per_pixel(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling: Sampling) -> Array:
@@ -156,4 +146,5 @@ def surface_at(draw: Draw, fragments: Fragments, size: tuple[int, int], sampling
         colour=at(corner.colour),
         footprint=footprint,
         level=sampling.level,
+        member=None if corner.member is None else corner.member[place[:, 0]],
     )

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from glshade.radiance.draw import Draw
 from glshade.radiance.surface import Surface, at_vertices
+from glshade.reference.division import by_draw
 from glshade.reference.inputs import Inputs
 from glshade.reference.interpolate import weights
 from glshade.reference.raster import Fragments, rasterise, resolve
@@ -41,10 +42,8 @@ def visible_parts(inputs: Inputs) -> Iterator[VisiblePart]:
     # The layers of a pixel are in drawing order, and the last one is the nearest.
     front = layers.take(np.flatnonzero(np.diff(layers.pixel, append=-1) != 0))
     fragments = Fragments.joined([nearest.take(~np.isin(nearest.pixel, front.pixel)), front])
-    for number, draw in enumerate(inputs.draws):
-        part = fragments.take(fragments.draw == number)
-        if len(part):
-            yield VisiblePart(draw, part.pixel.astype(np.intp), *_points(draw, part, inputs.size))
+    for draw, _, part in by_draw(inputs, fragments, whole=True):
+        yield VisiblePart(draw, part.pixel.astype(np.intp), *_points(draw, part, inputs.size))
 
 
 def _points(draw: Draw, fragments: Fragments, size: tuple[int, int]) -> tuple[Surface, Indices]:

@@ -45,6 +45,18 @@ def _pose(matrix: Matrix4) -> Matrix4:
     return matrix
 
 
+def extent(points: Array) -> Array:
+    """Returns the least and the largest coordinates (2, 3) of points (N, 3)."""
+    # One coordinate at a time: NumPy is ten times as slow along an axis of three.
+    return np.array([[coordinate.min() for coordinate in points.T], [coordinate.max() for coordinate in points.T]])
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """Returns the cross product (3,) of two vectors (3,), in a tenth of the time of NumPy's function."""
+    (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
+    return np.array([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
+
+
 def is_singular(linear: Array) -> bool:
     """Returns whether a matrix (3, 3) flattens space, whatever its scale: its columns, made unit, span a volume below 1e-9."""
     length = np.linalg.norm(linear, axis=0)
@@ -228,13 +240,13 @@ class Camera(Document):
         if not np.any(backward):
             backward = np.array(THREE_QUARTERS)
         backward = backward / np.linalg.norm(backward)
-        right = np.cross(up, backward)
+        right = _cross(up, backward)
         if np.linalg.norm(right) <= 1e-9 * np.linalg.norm(up):
             # The view is along `up`, so another axis has to replace it. The least parallel one loses the fewest digits.
-            right = np.cross(np.eye(3)[np.argmin(np.abs(backward))], backward)
+            right = _cross(np.eye(3)[np.argmin(np.abs(backward))], backward)
         right = right / np.linalg.norm(right)
-        axes: Array = np.stack([right, np.cross(backward, right), backward]) @ self._turned.T
-        return axes
+        axes: Array = np.array([right, _cross(backward, right), backward])
+        return axes @ self._turned.T if self.turn else axes
 
     @property
     def _rotation(self) -> Array:
@@ -268,7 +280,7 @@ class Camera(Document):
         points: the scene's vertices, or the corners of boxes round them (N, 3) [scene units].
         aspect: the picture's width divided by its height.
         """
-        middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+        middle = 0.5 * extent(points).sum(axis=0)
         axes = self.axes(middle)
         half_width, half_height = self.half_size(aspect)
         if self.framing:
@@ -282,7 +294,7 @@ class Camera(Document):
         else:
             eye = np.array(self.matrix)[:3, 3] if self.matrix is not None else np.array(self.eye)
             pivot = middle if self.target is None else np.array(self.target)
-            eye = pivot + self._turned @ (eye - pivot)
+            eye = pivot + (self._turned @ (eye - pivot) if self.turn else eye - pivot)
         near, far = self.depth_range(-(points - eye) @ axes[2])
         return View(self.perspective, eye, axes, half_width, half_height, near, far)
 

@@ -12,6 +12,7 @@ from glshade.document import Document
 from glshade.files import read_bytes
 from glshade.limits import LARGEST_MESH
 from glshade.mesh import file as mesh_file
+from glshade.mesh.copies import Copies
 from glshade.mesh.mesh import Mesh
 from glshade.scene.scene import Scene
 from glshade.textures.pixel_array import PixelArray
@@ -34,7 +35,7 @@ def scene_digest(scene: Scene) -> str:
             return [*parts, *model.lights]
         if isinstance(value, Path):
             return hashlib.sha256(read_bytes(value, LARGEST_MESH)).hexdigest()
-        if isinstance(value, Mesh | PixelArray):
+        if isinstance(value, Mesh | Copies | PixelArray):
             return value.digest
         if isinstance(value, Document):
             return {key: content(item) for key, item in _written(value)}

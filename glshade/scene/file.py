@@ -244,6 +244,11 @@ class SceneFile:
                 self._probed.add(path)
             except AssetError as error:
                 problems.append(f"{self.path}: {place}: {error}")
+        for place, material, name in scene.tables(self._checked):
+            try:
+                material.table(name)
+            except AssetError as error:
+                problems.extend(f"{self.path}: {place}: {problem}" for problem in error.problems)
         if problems:
             raise SceneError(problems)
         if self._checked is None:

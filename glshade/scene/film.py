@@ -13,13 +13,16 @@ from pydantic import (
     Field,
     ValidationInfo,
     WithJsonSchema,
+    field_validator,
 )
 
-from glshade.document import Document, Finite, fault, nearest, number, resolved, value_of
+from glshade.document import Document, Finite, Shorthand, fault, nearest, number, resolved, value_of
 from glshade.errors import figure
 from glshade.image.layer_paths import PNG_AOVS, LayerFormat
 from glshade.image.layers import AOVS
 from glshade.limits import Limits
+from glshade.optics.observer import matching
+from glshade.optics.spectra import Spectrum
 
 # The largest side of a picture [pixels]. A row of 2^17 pixels of 16 bytes is 2 MiB, which other programs can still open.
 LARGEST_SIDE = 131072
@@ -30,6 +33,9 @@ LARGEST_SUPERSAMPLE = 16
 LARGEST_POINT = 256
 # The largest number of a background. The sum of 16 x 16 of them fits into float32.
 BRIGHTEST = 1e30
+
+# The largest number of bands. With 1 nm for each, more of them change nothing.
+MOST_BANDS = 300
 
 Side = Annotated[int, Field(ge=1, le=LARGEST_SIDE), BeforeValidator(number)]
 Corner = Annotated[int, Field(ge=0, lt=LARGEST_SIDE), BeforeValidator(number)]
@@ -55,6 +61,12 @@ def _configuration(value: Any, info: ValidationInfo) -> Any:
 def _aov(value: str) -> str:
     if value not in AOVS:
         raise fault(f"unknown layer {value!r}" + nearest(value, AOVS))
+    return value
+
+
+def _threes(value: int) -> int:
+    if value % 3:
+        raise fault(f"must be a multiple of 3, because a shader computes three bands at once, not {value}")
     return value
 
 
@@ -85,6 +97,13 @@ class Film(Document):
     )
     encoding: Literal["srgb", "linear"] = Field("srgb", description="encoding of 8-bit pictures; EXR is always linear")
     exposure: Annotated[float, Field(ge=-64, le=64)] = Field(0.0, description="multiplies all light by 2 to this power [stops]")
+    white: Annotated[Spectrum, Shorthand("spectrum")] | None = Field(
+        None, description="light that looks white, such as A; left out: D65, and other lights keep their colour"
+    )
+    bands: Annotated[int, Field(ge=3, le=MOST_BANDS), AfterValidator(_threes), BeforeValidator(number)] = Field(
+        12,
+        description="bands of wavelengths: for spectra of models that are not linear in their colours, for the layer spectrum",
+    )
     view: str | None = Field(
         None, description="OpenColorIO view that transforms 8-bit pictures; left out although display is set: its default view"
     )
@@ -121,6 +140,13 @@ class Film(Document):
             yield ("ocio",), "has no effect without a view or a display"
         if transformed and value_of(data, "encoding") == "linear":
             yield ("encoding",), "linear cannot be used together with a view or a display, which encode the picture"
+
+    @field_validator("white", mode="after")
+    @classmethod
+    def _visible(cls, value: Spectrum | None) -> Spectrum | None:
+        if value is not None and min(value.light() @ matching()) <= 0:
+            raise fault(f"{value.name} cannot be the white, because it lacks light that people see")
+        return value
 
     @property
     def window(self) -> tuple[int, int, int, int]:

@@ -14,15 +14,15 @@ from pydantic import (
     BeforeValidator,
     Discriminator,
     Field,
-    SkipValidation,
     Tag,
     WithJsonSchema,
 )
 
 from glshade.brdfs import BRDFS, Brdf
-from glshade.document import Chosen, Document, File, Triple, Vector3, fault, value_of
+from glshade.document import AsIs, Chosen, Document, File, Triple, Vector3, fault, value_of
 from glshade.errors import AssetError
 from glshade.image.srgb import srgb_to_linear
+from glshade.mesh.copies import Copies
 from glshade.mesh.formats import SUFFIXES
 from glshade.mesh.mesh import Mesh
 from glshade.presets import FromPreset
@@ -81,9 +81,9 @@ class Transform(Document):
 def _mesh(value: Any) -> Any:
     """Returns a Mesh made of a trimesh.Trimesh, of another object with vertices and faces, or of a pair (vertices, faces).
 
-    A Mesh and a path are returned as they are.
+    A Mesh, Copies of one and a path are returned as they are.
     """
-    if isinstance(value, Mesh | str | Path):
+    if isinstance(value, Mesh | Copies | str | Path):
         return value
     uvs = colours = None
     if hasattr(value, "vertices") and hasattr(value, "faces"):
@@ -101,7 +101,9 @@ def _mesh(value: Any) -> Any:
     elif isinstance(value, tuple | list) and len(value) == 2:
         vertices, faces = value
     else:
-        raise fault("must be the path of a mesh file (or, in Python, a Mesh, a trimesh or a pair of vertices and faces)")
+        raise fault(
+            "must be the path of a mesh file (or, in Python, a Mesh, Copies, a trimesh or a pair of vertices and faces)"
+        )
     try:
         return Mesh.build(np.asarray(vertices), np.asarray(faces), None, uvs, colours)
     except AssetError as error:
@@ -110,11 +112,11 @@ def _mesh(value: Any) -> Any:
 
 def _mesh_branch(value: Any) -> str:
     """Returns the tag of the union branch that validates the value. The tags are those of `document.BRANCHES`."""
-    return "<value>" if isinstance(value, Mesh) else "<texture-table>"
+    return "<value>" if isinstance(value, Mesh | Copies) else "<texture-table>"
 
 
 MeshSource = Annotated[
-    Annotated[SkipValidation[Mesh], Tag("<value>")] | Annotated[File, Tag("<texture-table>")],
+    Annotated[Mesh | Copies, AsIs(), Tag("<value>")] | Annotated[File, Tag("<texture-table>")],
     Discriminator(_mesh_branch),
     WithJsonSchema({"type": "string", "format": "path"}),
 ]
@@ -171,6 +173,11 @@ class Object(Document):
         description="whether the lights of its mesh file shine, in lux and candela: the radiance 1 is then 1 cd/m^2",
     )
     quality: Quality | None = Field(None, description="replaces the scene's quality key by key; storage is not allowed here")
+
+    @property
+    def own_mesh(self) -> Mesh | None:
+        """The mesh that the object holds itself, at one or several places; None where it names a file or has a shape."""
+        return self.mesh.mesh if isinstance(self.mesh, Copies) else self.mesh if isinstance(self.mesh, Mesh) else None
 
     @classmethod
     def cross_faults(cls, data: Any) -> Iterable[tuple[tuple[str | int, ...], str]]:

@@ -33,7 +33,7 @@ Placed = Mapping[str | None, tuple[Array, str | None]]
 
 def placed(objects: Iterable[Object]) -> Placed:
     """Returns the transform of every object with a name. The objects of a long chain of parents share these arrays."""
-    return {item.name: (item.transform.array(), item.parent) for item in objects}
+    return {item.name: (item.transform.array(), item.parent) for item in objects if item.name is not None}
 
 
 def world(placements: Placed, item: Object) -> Array:
@@ -140,10 +140,11 @@ def _files(scene: Scene, load: Callable[[Path], Model], every: bool) -> Iterator
 
     every: whether objects without `file_lights` are included.
     """
-    placements = placed(scene.objects)
-    for item in scene.objects:
-        if isinstance(item.mesh, Path) and (every or item.file_lights):
-            yield item, load(item.mesh), world(placements, item)
+    wanted = [item for item in scene.objects if isinstance(item.mesh, Path) and (every or item.file_lights)]
+    placements = placed(scene.objects) if wanted else {}
+    for item in wanted:
+        assert isinstance(item.mesh, Path)
+        yield item, load(item.mesh), world(placements, item)
 
 
 def _camera(item: Object, name: str, table: Mapping[str, Any], transform: Array) -> Camera:

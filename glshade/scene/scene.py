@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 
+from glshade.brdfs import Brdf
 from glshade.document import Chosen, Document, FileOrFolder, fault, nearest, resolved, value_of
 from glshade.errors import AssetError
 from glshade.lights import LIGHTS, Light
@@ -140,6 +141,15 @@ class Scene(Document):
                     value = getattr(material, name)
                     if isinstance(value, Picture):
                         yield f"{place}.{name}.texture", value
+
+    def tables(self, known: "Scene | None" = None) -> Iterator[tuple[str, Brdf, str]]:
+        """Yields (key path, material, name of a table) for every table that a material of the scene reads. known: as for
+        `pictures`.
+        """
+        shared = {id(material) for _, material in known.placed_materials()} if known else set()
+        for place, material in self.placed_materials():
+            if isinstance(material, Brdf) and id(material) not in shared:
+                yield from ((f"{place}.{key}", material, name) for name, key in material.tables.items())
 
     def placed_materials(self) -> Iterator[tuple[str, Any]]:
         """Yields (key path, material) for the scene's table of materials and for the material of every object."""

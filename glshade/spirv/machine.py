@@ -54,7 +54,7 @@ class Texture(Protocol):
     def sample(self, at: Array, level: Array | None, bias: Array, steps: tuple[Array, Array] | None) -> Array:
         """Returns the filtered texels (4, n).
 
-        at: (2, n), texture coordinates.
+        at: (2, n), texture coordinates; (3, n) for a texture of three dimensions.
         level: (n,), the level of detail; None to derive it.
         bias: (n,), which is added to a derived level.
         steps: the changes (2, n) of `at` from a pixel to the next one in x and in y; None where lanes are no squares of pixels.
@@ -63,8 +63,8 @@ class Texture(Protocol):
     def fetch(self, at: Array, level: Array) -> Array:
         """Returns the texels (4, n) at integer coordinates (2, n) of a level (n,)."""
 
-    def size(self, level: Array) -> tuple[int, int]:
-        """Returns width and height of a level [texels]."""
+    def size(self, level: Array) -> tuple[int, ...]:
+        """Returns width and height of a level, and the depth of a texture of three dimensions [texels]."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from glshade.spirv.arithmetic import FLOAT64, Arithmetic
 from glshade.spirv.compiler import compiled
 from glshade.spirv.machine import Observer, run
 from glshade.spirv.module import Module
+from glshade.spirv.table import TableText
 
 Array = NDArray[Any]
 
@@ -31,10 +32,12 @@ class ValueText:
 
     stage: the text of a vertex stage that calls the function.
     module: the same stage in SPIR-V.
+    tables: sampler name -> table that the function reads.
     """
 
     stage: Stage
     module: Module
+    tables: Mapping[str, TableText] = field(default_factory=dict)
 
     def run(
         self, inputs: Mapping[str, Any], lanes: int, arithmetic: Arithmetic = FLOAT64, observer: Observer | None = None
@@ -45,7 +48,7 @@ class ValueText:
             for all lanes or with the axis of lanes first.
         Errors: ShaderError.
         """
-        given = {**_ZERO, **inputs}
+        given = {**_ZERO, **inputs, **self.tables}
         result = run(self.module, given, lanes, arithmetic, observer=observer, place=self.stage.place)
         return np.asarray(result.outputs["v_value"])
 
@@ -69,9 +72,10 @@ def model_text(brdf: Brdf, shaders: Shaders | None = None) -> ValueText:
     """Returns the GLSL of a material's model, with the code that its options choose. Its values are f cos [1/sr].
 
     shaders: optional; the shader files. Default: those that ship with glshade.
-    Errors: ShaderError, MissingLibrary.
+    Errors: ShaderError, MissingLibrary; AssetError for a table whose file cannot be read.
     """
-    return value_text(value_code(brdf), shaders)
+    tables = {f"u_{name}": TableText(volume) for name, volume in brdf.volumes().items()}
+    return replace(value_text(value_code(brdf), shaders), tables=tables)
 
 
 def evaluate_text(brdf: Brdf, l: Array, v: Array, shaders: Shaders | None = None, arithmetic: Arithmetic = FLOAT64) -> Array:

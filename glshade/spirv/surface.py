@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -16,7 +16,7 @@ from glshade.glsl.plan import PAGE, ProgramPlan
 from glshade.glsl.planner import further_plan, plan_instance
 from glshade.glsl.shaders import Shaders
 from glshade.glsl.source import Source, Stage
-from glshade.glsl.uniforms import exposed_uniforms, light_pages, light_uniforms, object_uniforms, pictures
+from glshade.glsl.uniforms import exposed_uniforms, light_pages, light_uniforms, object_uniforms, pictures, tables
 from glshade.lights import LIGHTS
 from glshade.radiance.draw import Draw, wide
 from glshade.radiance.sampler import Sampler
@@ -27,7 +27,8 @@ from glshade.spirv.compiler import compiled
 from glshade.spirv.digits import Digits, Run, measure_digits, measure_errors
 from glshade.spirv.machine import Observer, run
 from glshade.spirv.module import Module, StageName
-from glshade.textures.texels import placement_of, texels_of
+from glshade.spirv.table import TableText
+from glshade.textures.volume import Volume
 
 Array = NDArray[Any]
 
@@ -54,6 +55,7 @@ class Program:
     rate: where it runs: flat, gouraud or phong.
     uniforms: name -> value.
     samplers: name -> texture.
+    tables: name -> table of the model.
     """
 
     module: Module
@@ -61,6 +63,7 @@ class Program:
     rate: str
     uniforms: Mapping[str, Any]
     samplers: Mapping[str, Sampler]
+    tables: Mapping[str, TableText]
 
     def run(self, surface: Surface, arithmetic: Arithmetic, observer: Observer | None = None) -> Array:
         """Returns the light (N, 3) of N points, linear Rec. 709.
@@ -98,7 +101,7 @@ class Program:
         """Returns the light (N, 3) that the stage computes from its inputs."""
         lanes = len(surface.position)
         pictures = {name: _Picture(sampler, surface) for name, sampler in self.samplers.items()}
-        given = {**inputs, **pictures}
+        given = {**inputs, **pictures, **self.tables}
         outputs = run(self.module, given, lanes, arithmetic, observer=observer, place=self.stage.place).outputs
         if self.rate == "phong":
             return np.asarray(outputs["o_colour"][:, :3])
@@ -127,6 +130,24 @@ class SurfaceText:
             tile = slice(start, start + TILE)
             result[tile] = self._tile(part_of(surface, tile))
         return result
+
+    def with_samplers(self, change: Callable[[Sampler], Sampler]) -> SurfaceText:
+        """Returns the text with a function applied to each texture that it reads."""
+        return SurfaceText(
+            tuple(
+                replace(program, samplers={name: change(sampler) for name, sampler in program.samplers.items()})
+                for program in self.programs
+            )
+        )
+
+    def with_tables(self, change: Callable[[Volume], Volume]) -> SurfaceText:
+        """Returns the text with a function applied to each table that it reads."""
+        return SurfaceText(
+            tuple(
+                replace(program, tables={name: TableText(change(table.volume)) for name, table in program.tables.items()})
+                for program in self.programs
+            )
+        )
 
     def _tile(self, surface: Surface) -> Array:
         exact = self._sum(_wide(surface), FLOAT64)
@@ -171,7 +192,13 @@ def shading_stage(source: Source, rate: str) -> tuple[Stage, StageName]:
 
 
 def _programs(scene: Scene, assembly: Assembly, draw: Draw, shaders: Shaders) -> Iterator[Program]:
-    """Yields the programs of an instance: one, or one for each page of lights."""
+    """Yields the programs of an instance: one, or one for each page of lights of each of its shares."""
+    for share in draw.shares or (draw,):
+        yield from _pages(scene, assembly, share, shaders)
+
+
+def _pages(scene: Scene, assembly: Assembly, draw: Draw, shaders: Shaders) -> Iterator[Program]:
+    """Yields the programs of an instance without shares: one, or one for each page of lights."""
     instance, exposure = draw.instance, scene.film.exposure
     plan = text_plan(instance, assembly)
     pages = []
@@ -186,7 +213,7 @@ def _programs(scene: Scene, assembly: Assembly, draw: Draw, shaders: Shaders) ->
         for key, records in pages:
             if index < len(records):
                 uniforms |= _block(key, records[index])
-        yield _program(of_page, instance, assembly, uniforms, shaders)
+        yield _program(of_page, draw, assembly, uniforms, shaders)
 
 
 def _lights(plan: ProgramPlan, instance: Instance, assembly: Assembly, exposure: float) -> dict[str, Any]:
@@ -196,7 +223,7 @@ def _lights(plan: ProgramPlan, instance: Instance, assembly: Assembly, exposure:
     return {name: value[0] if name in single else value for name, value in values.items()}
 
 
-def _program(plan: ProgramPlan, instance: Instance, assembly: Assembly, uniforms: dict[str, Any], shaders: Shaders) -> Program:
+def _program(plan: ProgramPlan, draw: Draw, assembly: Assembly, uniforms: dict[str, Any], shaders: Shaders) -> Program:
     """Returns the program of a plan, which takes attributes that are in world space already."""
     # The reference places vertices itself, so the transforms of the text leave them where they are.
     uniforms |= {
@@ -207,12 +234,10 @@ def _program(plan: ProgramPlan, instance: Instance, assembly: Assembly, uniforms
         "u_viewer": wide(assembly.view.toward_viewer),
     }
     stage, name = shading_stage(generate(plan, shaders), plan.rate)
-    material = instance.material
-    samplers = {
-        name: Sampler.load(texels_of(material, key)).placed(placement_of(material, key))
-        for name, key in pictures(plan, material).items()
-    }
-    return Program(compiled(stage, name), stage, plan.rate, uniforms, samplers)
+    material = draw.instance.material
+    samplers = {name: draw.sampler(key) for name, key in pictures(plan, material).items()}
+    volumes = {name: TableText(volume) for name, volume in tables(plan, material).items()}
+    return Program(compiled(stage, name), stage, plan.rate, uniforms, samplers, volumes)
 
 
 def _block(key: str, records: NDArray[np.void]) -> dict[str, Any]:

@@ -9,9 +9,7 @@ from weakref import WeakValueDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from glshade.image import file as picture_file
 from glshade.image.contents import PictureContents
-from glshade.image.file import Encoding
 
 
 class PixelArray:
@@ -38,13 +36,15 @@ class PixelArray:
             raise ValueError(f"an array of pixels must have the shape (H, W) or (H, W, 1 to 4), not {values.shape}")
         # A file of 16-bit floats or of doubles is read as float32, too. A number beyond float32 becomes infinite here.
         with np.errstate(over="ignore"):
-            pixels = np.array(values, dtype=np.uint8 if values.dtype == np.uint8 else np.float32, order="C")
-        if not np.isfinite(pixels).all():
+            pixels = np.array(values[::-1], dtype=np.uint8 if values.dtype == np.uint8 else np.float32, order="C")
+        if pixels.dtype != np.uint8 and not np.isfinite(pixels).all():
             raise ValueError("an array of pixels must hold finite numbers of float32's range")
         pixels = pixels.reshape(*pixels.shape[:2], -1)
         pixels.flags.writeable = False
-        digest = hashlib.sha256(f"{pixels.shape} {pixels.dtype}".encode() + pixels.tobytes()).hexdigest()
-        return _in_use.setdefault(digest, cls(pixels, digest))
+        digest = hashlib.sha256(f"{pixels.shape} {pixels.dtype}".encode())
+        digest.update(pixels.data)
+        # Textures are uploaded from the bottom row on, in which order the rows lie in memory.
+        return _in_use.setdefault(digest.hexdigest(), cls(pixels[::-1], digest.hexdigest()))
 
     def __reduce__(self) -> tuple[Any, ...]:
         # A copy and an unpickled picture are the object that is in use already, if the process has one.
@@ -53,15 +53,10 @@ class PixelArray:
     def __repr__(self) -> str:
         return f"<PixelArray {'x'.join(map(str, self.pixels.shape))} {self.pixels.dtype} {self.digest[:12]}>"
 
-    def read(self, encoding: Encoding) -> NDArray[np.float32]:
-        """Returns the picture as `glshade.image.file.read` does: (H, W, 4) float32, linear Rec. 709 with straight alpha.
-
-        encoding: the encoding of the colours; "auto" takes uint8 as sRGB-encoded and floats as linear.
-        """
-        codes = self.pixels.dtype == np.uint8
-        # OpenImageIO multiplies by the rounded reciprocal, so a file of the same codes gives the same numbers to the last bit.
-        pixels = self.pixels.astype(np.float32) * np.float32(1 / 255) if codes else self.pixels
-        return picture_file.for_texture(PictureContents(pixels, "srgb" if codes else "linear", False), encoding)[0]
+    @property
+    def contents(self) -> PictureContents:
+        """The picture as if it had been read from a file: uint8 counts as sRGB-encoded, floats as linear."""
+        return PictureContents(self.pixels, "srgb" if self.pixels.dtype == np.uint8 else "linear", False)
 
 
 # Digest -> the picture, for the pictures that are in use.

@@ -4,9 +4,9 @@ import math
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, PlainSerializer, SkipValidation, Tag, WithJsonSchema
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, PlainSerializer, Tag, WithJsonSchema
 
-from glshade.document import Document, File, Finite, Triple, fault
+from glshade.document import AsIs, Document, File, Finite, Triple, fault
 from glshade.image.file import Encoding
 from glshade.textures.pixel_array import PixelArray
 
@@ -65,7 +65,7 @@ def _source_branch(value: Any) -> str:
 
 # A picture file or, in Python, an array of pixels.
 PictureSource = Annotated[
-    Annotated[SkipValidation[PixelArray], Tag("<value>")] | Annotated[File, Tag("<texture-table>")],
+    Annotated[PixelArray, AsIs(), Tag("<value>")] | Annotated[File, Tag("<texture-table>")],
     Discriminator(_source_branch),
     PlainSerializer(lambda value: value.digest if isinstance(value, PixelArray) else str(value), when_used="json"),
     WithJsonSchema({"type": "string", "format": "path"}),

@@ -163,6 +163,7 @@ def drawn_from(scene: Scene) -> tuple[Any, ...]:
     """
     assembly = ready(scene)
     return tuple(
-        (i.number, generate(plan_instance(i, assembly, "linear")), i.material, i.mesh.digest, i.back_faces)
+        (i.number, generate(plan_instance(part, assembly, "linear")), part.material, i.mesh.digest, i.back_faces)
         for i in assembly.instances
+        for part in i.parts
     )

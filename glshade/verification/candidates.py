@@ -101,7 +101,8 @@ def find_candidates(
     Errors: SceneError, ShaderError; NoReference for a model that has only its GLSL, where no compiler can read that.
     """
     film = scene.film
-    inputs = with_text(scene, prepare(scene, shading), shading, derived, shaders)
+    values = prepare(scene, shading).decoded(driver.decoded, driver.decoding)
+    inputs = with_text(scene, values, shading, derived, shaders)
     offsets = _offsets(film, driver)
     if len(offsets) == 1:
         shown = _shown(inputs, _freedom(film, driver))
@@ -252,17 +253,23 @@ def _undetermined(inputs: Inputs, shown: _Shown, wide: Flags) -> _Shown:
     off, but very far. So the pixels beside a wide one are not determined either.
     wide: (P,), the wide pixels; those beside them are added where a text was run.
     """
-    from scipy.ndimage import binary_dilation
-
     width, height = inputs.size
     of_text = np.array([draw.text is not None for draw in inputs.draws] + [False])
     run = np.zeros(len(wide), dtype=np.bool_)
     # The last entry stands for the background, whose number is -1.
     run[shown.pixel[of_text[shown.draw]]] = True
-    around = binary_dilation((wide & run).reshape(height, width), np.ones((3, 3))).reshape(-1) & run
+    around = _with_neighbours((wide & run).reshape(height, width)).reshape(-1) & run
     wide |= around
     free = around[shown.pixel, None]
     return replace(shown, low=np.where(free, -np.inf, shown.low), high=np.where(free, np.inf, shown.high))
+
+
+def _with_neighbours(flags: Flags) -> Flags:
+    """Returns whether each pixel (H, W), or one of the eight pixels round it, has its flag set."""
+    padded = np.pad(flags, 1)
+    rows = padded[:-2] | padded[1:-1] | padded[2:]
+    result: Flags = rows[:, :-2] | rows[:, 1:-1] | rows[:, 2:]
+    return result
 
 
 def _doubtful(seen: Visible) -> Flags:

@@ -22,9 +22,6 @@ from glshade.reference.inputs import Inputs
 from glshade.reference.visible import visible_parts
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
-from glshade.spirv.arithmetic import FLOAT64
-from glshade.spirv.compiler import compiled
-from glshade.spirv.surface import SurfaceText, surface_text
 
 Array = NDArray[Any]
 
@@ -45,6 +42,8 @@ def with_text(scene: Scene, inputs: Inputs, shading: Rate | None, every: bool, s
     chosen = [every or not draw.model.has_reference for draw in inputs.draws]
     if not any(chosen):
         return inputs
+    from glshade.spirv.surface import surface_text
+
     assembly, files = ready(scene, shading), shaders or current()
     draws = []
     for draw, is_chosen in zip(inputs.draws, chosen, strict=True):
@@ -101,6 +100,10 @@ def _line(
     scene: Scene, assembly: Assembly, draw: Draw, surface: Surface, twin: Array, allowed: Array, shaders: Shaders | None
 ) -> str:
     """Returns the end of a sentence, with the lines that make the difference; empty where they are not known."""
+    from glshade.spirv.arithmetic import FLOAT64
+    from glshade.spirv.compiler import compiled
+    from glshade.spirv.surface import SurfaceText, surface_text
+
     text = draw.text
     if not isinstance(text, SurfaceText) or shaders is None:
         return ""

@@ -118,7 +118,9 @@ def _visible(inputs: Inputs, driver: Freedom) -> tuple[Pieces, Pieces]:
     for kind in (False, True):
         fragments = Fragments.joined(part for part, _ in parts[kind])
         z = Depths.joined(part for _, part in parts[kind])
-        near = z.nearest >= hidden[fragments.pixel]
+        near = np.flatnonzero(z.nearest >= hidden[fragments.pixel])
+        # A part may hold fragments of several draws, with those of triangles that are clipped after all others.
+        near = near[np.argsort(fragments.draw[near], kind="stable")]
         pieces.append(_settled(inputs, fragments.take(near), z.take(near), driver))
     return pieces[0], pieces[1]
 

@@ -27,6 +27,15 @@ def test_the_struct_has_the_parameters(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", BRDFS)
+def test_the_file_declares_the_tables(name: str) -> None:
+    text = (SHIPPED / f"brdf/{name}.glsl").read_text(encoding="utf-8")
+    model = BRDFS[name]
+    assert re.findall(r"^uniform sampler3D u_(\w+);", text, re.M) == list(model.tables)
+    assert set(model.tables.values()) <= set(model.model_fields)
+    assert set(model().volumes()) == set(model.tables) <= set(model().data())
+
+
+@pytest.mark.parametrize("name", BRDFS)
 def test_what_a_model_declares_is_sound(name: str) -> None:
     model = BRDFS[name]
     assert model.parameters(), "a model without a parameter is a constant"

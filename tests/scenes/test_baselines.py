@@ -29,8 +29,8 @@ WIDTH = 96
 COSTLY = frozenset(
     {
         *("anisotropy", "ashikhmin-shirley-grid", "detail", "direction-and-point", "emission", "falloff"),
-        *("gallery", "materials", "metal-and-plastic", "orthographic-viewer", "perspective-viewer", "phong-exponents"),
-        *("spatial-variation", "spot"),
+        *("gallery", "materials", "measured", "metal-and-plastic", "orthographic-viewer", "perspective-viewer"),
+        *("phong-exponents", "spatial-variation", "spot"),
     }
 )
 # The most that the folder of baselines may hold [bytes].

@@ -23,7 +23,7 @@ from glshade.verification.trials import try_mutations
 
 SCENES = sorted((Path(__file__).resolve().parents[2] / "scenes").glob("*.toml"))
 # Every mutation shows in at least one of these scenes. The slow test takes the others too.
-FEW = ("emission", "falloff", "perspective-viewer")
+FEW = ("emission", "falloff", "measured", "perspective-viewer")
 
 
 def sized(path: Path, width: int) -> glshade.Scene:

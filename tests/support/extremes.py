@@ -199,9 +199,10 @@ def conditions(material: Brdf, l: Any, v: Any) -> tuple[Array, Array, Array]:
     is rounded.
     """
     parameters = {name: rounded(x).astype(np.float64) for name, x in parameter_values(material).items()}
+    fixed = {**material.chosen(), **material.data()}
 
     def f(l: Array, v: Array, given: dict[str, Array] = parameters) -> Array:
-        value: Array = type(material).brdf_cos(SimpleNamespace(**given, **material.chosen()), l, v)
+        value: Array = type(material).brdf_cos(SimpleNamespace(**given, **fixed), l, v)
         return np.broadcast_to(value, l.shape)
 
     l, v = np.asarray(l, dtype=np.float64), np.asarray(v, dtype=np.float64)

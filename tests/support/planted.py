@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pytest
@@ -26,12 +27,13 @@ from glshade.brdfs.phong import Phong
 from glshade.image import srgb
 from glshade.lights import Light, Placed
 from glshade.lights.spot import SpotLight
-from glshade.mesh import facets, fans, geometry, normals
+from glshade.lru import Lru
+from glshade.mesh import facets, geometry, normals, topology
 from glshade.scene import shape
 from glshade.scene.camera import Perspective
 from glshade.scene.film import Film
 from glshade.scene.object import Transform
-from glshade.textures import mipmap, texels
+from glshade.textures import mipmap, storage, texels
 
 Document = dict[str, Any]
 
@@ -77,7 +79,7 @@ def everywhere(patch: pytest.MonkeyPatch, right: Any, wrong: Any) -> None:
 def instances(change: Callable[..., Any]) -> Callable[[pytest.MonkeyPatch], None]:
     """Returns a `plant` that changes the arguments of each instance: change(scene, piece, view, lights, shading)."""
     right = assembly._instance
-    return lambda patch: patch.setattr(assembly, "_instance", lambda *given: right(*change(*given)))
+    return lambda patch: patch.setattr(assembly, "_instance", lambda *given: right(*change(*given[:5]), *given[5:]))
 
 
 def uniforms(kind: type[Light], change: Callable[[Any], dict[str, Any]]) -> Callable[[pytest.MonkeyPatch], None]:
@@ -186,6 +188,7 @@ def _half(camera: Perspective) -> float:
 
 def _not_decoded(patch: pytest.MonkeyPatch) -> None:
     everywhere(patch, srgb.srgb_to_linear, lambda c: np.asarray(c, dtype=np.float32))
+    everywhere(patch, storage._linear, lambda codes: codes.astype(np.float32) / np.float32(255))
 
 
 def _bump_inverted(patch: pytest.MonkeyPatch) -> None:
@@ -244,7 +247,12 @@ def _rotation_order(patch: pytest.MonkeyPatch) -> None:
 
 def _upside_down(patch: pytest.MonkeyPatch) -> None:
     right = texels.Texels.read
-    patch.setattr(texels.Texels, "read", lambda self: np.ascontiguousarray(right(self)[::-1]))
+
+    def wrong(self: Any) -> Any:
+        stored = right(self)
+        return replace(stored, levels=tuple(level[::-1] for level in stored.levels))
+
+    patch.setattr(texels.Texels, "read", wrong)
 
 
 # Eighteen faults in the code of this renderer.
@@ -269,8 +277,12 @@ def _no_grandparents(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(assembly, "world_of", wrong)
 
 
-def _not_welded(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(fans, "weld", lambda first, *more: np.arange(len(first)))
+def not_welded(patch: pytest.MonkeyPatch) -> None:
+    """Vertices at equal positions count as different ones."""
+    patch.setattr(topology, "weld", lambda positions: np.arange(len(positions)))
+    # The topologies of meshes of earlier tests are right.
+    patch.setattr(topology, "_of", WeakKeyDictionary())
+    patch.setattr(topology, "_recent", Lru(topology.KEPT))
 
 
 def _crop_shifted(patch: pytest.MonkeyPatch) -> None:
@@ -314,8 +326,13 @@ def _linked_to_the_next(scene: Any, piece: Any, view: Any, lights: Any, shading:
 
 
 def _one_corner(patch: pytest.MonkeyPatch) -> None:
-    right = geometry.corner_angles
-    everywhere(patch, right, lambda mesh: right(mesh) * np.array([1.0, 0.1, 0.1]))
+    right = geometry.normals_and_angles
+
+    def wrong(mesh: Any) -> Any:
+        normals, angles = right(mesh)
+        return normals, angles * np.array([1.0, 0.1, 0.1])
+
+    everywhere(patch, right, wrong)
 
 
 def _corner_for_centroid(patch: pytest.MonkeyPatch) -> None:
@@ -388,7 +405,7 @@ FAULTS = (
     Fault(
         "not welded",
         "smoothing stops where triangles have vertices of their own",
-        _not_welded,
+        not_welded,
         with_ball(normals="smooth"),
     ),
     Fault("crop shifted", "a crop begins one pixel too far left", _crop_shifted, filmed(crop=[20, 10, 20, 20])),

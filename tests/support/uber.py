@@ -41,6 +41,7 @@ from glshade.mesh.mesh import Mesh
 from glshade.mesh.tangents import with_tangents
 from glshade.textures.texels import texels_of
 from glshade.textures.texture import Texture
+from glshade.textures.volume import Volume
 
 # The largest number of lights of one type.
 LIGHTS_OF_A_KIND = 8
@@ -56,8 +57,11 @@ UNIFORMS = {
     "vec3": ("u_viewer", "u_ambient_intensity"),
     "sampler2D": ("u_normal_map", "u_direction_map"),
 }
-# The names that all models share: the struct Frame, and two functions that GLSL overloads by the type of the model's struct.
-SHARED = {"Frame", "brdf_cos", "ambient_reflectance"}
+# The samplers of the models' tables.
+TABLES = {f"u_{table}" for model in BRDFS.values() for table in model.tables}
+# The names that stay as they are: the struct Frame, two functions that GLSL overloads by the type of the model's struct, and
+# the samplers of tables.
+SHARED = {"Frame", "brdf_cos", "ambient_reflectance"} | TABLES
 
 
 @cache
@@ -253,7 +257,8 @@ class EverythingRenderer(Renderer):
     def prepare(self, scene: Scene, shading: Any, encoding: Encoding, part: Any = None) -> Prepared:
         made = super().prepare(scene, shading, encoding, part)
         exposure = scene.film.exposure
-        return replace(made, calls=[self.call(one.plan, one.instance, made.assembly, exposure) for one in made.calls])
+        drawn = [(one.plan, instance) for one in made.calls for instance in one.instances]
+        return replace(made, calls=[self.call(plan, instance, made.assembly, exposure) for plan, instance in drawn])
 
     def call(self, plan: ProgramPlan, instance: Instance, assembly: Assembly, exposure: float) -> DrawCall:
         """Returns the draw call of an instance with the uber shader."""
@@ -302,12 +307,16 @@ class EverythingRenderer(Renderer):
         values |= {name: np.int32(value) for name, value in integers.items()}
         maps = {"u_normal_map": plan.normal_map, "u_direction_map": plan.direction_map}
         samplers += [
-            (name, self.resources.texture(wanted)) for name, wanted in textures(plan, material).items() if maps.get(name)
+            (name, self.resources.texture(wanted))
+            for name, wanted in textures(plan, material).items()
+            if maps.get(name) or name in TABLES
         ]
         named = dict(samplers)
         # Unused samplers share a texture, because two types of sampler must not refer to one texture unit.
         unused = [name for name in program.uniforms if "texture_" in name or name in maps if name not in named]
         samplers += [(name, self.nothing) for name in unused]
+        empty = Volume.constant(0.0)
+        samplers += [(name, self.resources.texture(empty)) for name in TABLES & set(program.uniforms) - set(named)]
         written = {
             name: value if np.asarray(value).dtype == np.int32 else rounded(value)
             for name, value in values.items()
@@ -318,7 +327,7 @@ class EverythingRenderer(Renderer):
             if name in written:
                 written[name] = written[name][: program.members[name].array_length]
         vertices = self.resources.vertices.array(complete(instance.mesh), program)
-        return DrawCall(instance, plan, program, vertices, written, samplers, {}, [])
+        return DrawCall((instance,), instance.mirrored, plan, program, vertices, written, samplers, {}, [])
 
     @property
     def nothing(self) -> moderngl.Texture:

@@ -17,12 +17,12 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PACKAGE = ROOT / "glshade"
 # A room imports from the rooms before it.
 ROOMS = (
-    *("optics", "calibration", "image", "page", "lights", "presets", "textures", "mesh", "brdfs", "scene", "assembly"),
-    *("radiance", "glsl", "spirv", "gl", "reference", "debug", "driver", "verification", "catalogue", "pyrender", "tradeoff"),
-    *("golden", "live", "batch", "bench", "cli"),
+    *("optics", "calibration", "image", "page", "lights", "presets", "textures", "mesh", "measured", "brdfs", "scene"),
+    *("assembly", "radiance", "glsl", "spirv", "gl", "reference", "debug", "driver", "verification", "catalogue"),
+    *("pyrender", "tradeoff", "golden", "live", "batch", "bench", "cli"),
 )
 # Modules of no room, which every room may import. They import no room.
-BASE = {"errors", "found", "document", "files", "limits", "arrays", "version", "lru", "problem", "github"}
+BASE = {"errors", "found", "document", "files", "limits", "arrays", "version", "lru", "problem", "github", "startup"}
 # `python -m glshade` runs the command line.
 ENTRIES = {"", "__main__"}
 # docs/tradeoff.md names glshade.tradeoff.study.study, and what is documented keeps its name.

@@ -20,6 +20,8 @@ from numpy.typing import NDArray
 
 from glshade.bench.works import BY_HAND
 
+# Programs that show mesh files, with a light of their own. They take part where a work begins with a file.
+VIEWERS = ("f3d",)
 NAMES = tuple(sorted(path.stem for path in Path(__file__).parent.glob("*.py") if not path.stem.startswith("_")))
 
 

@@ -133,6 +133,18 @@ def _smooth(draw: Draw, fragments: Fragments, size: tuple[int, int]) -> Draw:
     return replace(draw, normal_map=None) if draw.normal_map is not None else draw
 
 
+def _next_cell(draw: Draw, fragments: Fragments, size: tuple[int, int]) -> Draw:
+    return draw.with_tables(lambda table: replace(table, shift=(1.0, 0.0, 0.0))) if draw.tables else draw
+
+
+def _reversed_depth(draw: Draw, fragments: Fragments, size: tuple[int, int]) -> Draw:
+    return draw.with_tables(lambda table: replace(table, texels=table.texels[::-1])) if draw.tables else draw
+
+
+def _transposed(draw: Draw, fragments: Fragments, size: tuple[int, int]) -> Draw:
+    return draw.with_tables(lambda table: replace(table, texels=table.texels.swapaxes(1, 2))) if draw.tables else draw
+
+
 # Name of a kind, text, and the edit of a draw, for the fragments that are shaded next and the picture's size.
 _EDITS: tuple[tuple[str, str, Callable[[Draw, Fragments, tuple[int, int]], Draw]], ...] = (
     ("normals", "normals reversed", _reversed),
@@ -147,4 +159,7 @@ _EDITS: tuple[tuple[str, str, Callable[[Draw, Fragments, tuple[int, int]], Draw]
     ("texture", "textures upside down", _flipped),
     ("texture", "textures missing", _untextured),
     ("texture", "normal map missing", _smooth),
+    ("table", "tables of reflectance read one cell beside the right one", _next_cell),
+    ("table", "tables of reflectance read with a mirrored azimuth", _reversed_depth),
+    ("table", "tables of reflectance read with two axes exchanged", _transposed),
 )

@@ -57,7 +57,7 @@ class PictureFormat:
         openimageio.write(path, contents, settings, self.window, self.matrices)
 
     def read(self, path: Path) -> PictureContents:
-        """Returns the pixels of a file: (H, W, C) float32 with C = 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA).
+        """Returns the pixels of a file: (H, W, C) uint8 or float32 with C = 1 (grey), 2 (grey, alpha), 3 (RGB) or 4 (RGBA).
 
         Errors: OSError, with the reason as its text.
         """

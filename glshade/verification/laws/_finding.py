@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from glshade.driver.freedom import measure_freedom
 from glshade.reference.freedom import LLVMPIPE, Freedom
 from glshade.reference.picture import radiance
+from glshade.reference.shade import Sampling
 from glshade.scene.object import Rate
 from glshade.scene.scene import Scene
 from glshade.verification.candidates import find_candidates, one_sample
@@ -65,7 +66,7 @@ class Finding:
 def findings(scene: Scene, laws: Sequence[Law], renderer: Any) -> Iterator[Finding]:
     """Yields one Finding for each law and renderer. The arguments and errors are those of `check_laws`."""
     driver = LLVMPIPE if renderer is None else measure_freedom(renderer.context)
-    draws: dict[DrawnBy, Draw] = {"reference": _by_reference}
+    draws: dict[DrawnBy, Draw] = {"reference": _by_reference(driver)}
     if renderer is not None:
         draws["gpu"] = _on(renderer)
     scene = _tried(scene)
@@ -102,10 +103,15 @@ def _allowed(scene: Scene, driver: Freedom) -> Expected:
     return replace(expected, low=centre - ROOM * (centre - low), high=centre + ROOM * (high - centre))
 
 
-def _by_reference(scene: Scene, *, shading: Rate | None = None, tile: int | None = None) -> Array:
-    """Draws with the float64 reference. It is a `Draw`."""
-    picture: Array = radiance(scene, shading=shading)[..., : len(scene.film.background)]
-    return picture
+def _by_reference(driver: Freedom) -> Draw:
+    """Returns a `Draw` that draws with the float64 reference, which decodes the codes of textures as the driver does."""
+    sampling = Sampling(decoded=driver.decoded)
+
+    def draw(scene: Scene, *, shading: Rate | None = None, tile: int | None = None) -> Array:
+        picture: Array = radiance(scene, shading=shading, sampling=sampling)[..., : len(scene.film.background)]
+        return picture
+
+    return draw
 
 
 def _on(renderer: Any) -> Draw:

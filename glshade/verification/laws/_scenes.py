@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from glshade.assembly.assembly import DEFAULT_MATERIAL, assemble
 from glshade.brdfs import BRDFS, Brdf
 from glshade.lights import Light
+from glshade.mesh.copies import Copies
 from glshade.mesh.mesh import Mesh
 from glshade.scene.camera import Camera, Intrinsics, Orthographic, Perspective, View, calibration_of, intrinsics
 from glshade.scene.object import Object, Transform
@@ -203,6 +204,9 @@ def pieces(scene: Scene, item: Object) -> list[Object]:
         return [with_mesh(item, item.shape.mesh())]
     if isinstance(item.mesh, Mesh):
         return [item]
+    if isinstance(item.mesh, Copies):
+        single = with_mesh(item, item.mesh.mesh)
+        return [placed(single, item.transform.array() @ pose) for pose in item.mesh.poses]
     if item.mesh is None:
         return []
     found = []

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from glshade.assembly.assembly import assemble
 from glshade.brdfs import Brdf
+from glshade.optics.spectra import Spectrum
 from glshade.scene.scene import Scene
 from glshade.textures.texture import Texture
 from glshade.verification.laws._law import Draw, Law, NotApplicableError
@@ -41,6 +42,8 @@ def _halved(material: Any) -> Any:
     if isinstance(emission, Texture):
         numbers = {key: tuple(x / 2 for x in getattr(emission, key)) for key in ("factor", "add")}
         half: Any = emission.model_copy(update=numbers)
+    elif isinstance(emission, Spectrum):
+        half = emission.model_copy(update={"scale": emission.scale / 2})
     else:
         half = tuple(x / 2 for x in emission)
     return material.model_copy(update={"emission": half})

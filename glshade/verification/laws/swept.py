@@ -37,7 +37,11 @@ def _document(value: Any, at_keys: Callable[[Any], Any]) -> Any:
         written = value.model_fields_set | {"type", "brdf"}
         value = {key: getattr(value, key) for key in type(value).model_fields if key in written}
     if isinstance(value, Mapping):
-        return {key: at_keys(item) if key in KEYS else _document(item, at_keys) for key, item in value.items()}
+        # A colour may be a spectrum, which is a table of its own.
+        return {
+            key: at_keys(item) if key in KEYS and not isinstance(item, Document) else _document(item, at_keys)
+            for key, item in value.items()
+        }
     if isinstance(value, list | tuple):
         return [_document(item, at_keys) for item in value]
     return value
@@ -51,7 +55,7 @@ def _sweeps(node: Any, key: str) -> Iterator[tuple[str, str]]:
     if isinstance(node, Mapping):
         for name, value in node.items():
             inner = f'{key}."{name}"' if key else name
-            if name in KEYS:
+            if name in KEYS and not isinstance(value, Mapping):
                 yield inner, repr(list(value) if isinstance(value, tuple) else value)
             else:
                 yield from _sweeps(value, inner)

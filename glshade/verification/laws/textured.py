@@ -11,21 +11,23 @@ from numpy.typing import NDArray
 
 from glshade.brdfs import Brdf
 from glshade.image.image import Image
+from glshade.optics.spectra import Spectrum
 from glshade.scene.object import Object
 from glshade.scene.scene import Scene
 from glshade.textures.texture import Texture
 from glshade.verification.laws._law import Draw, Law
 from glshade.verification.laws._scenes import material_of, mesh_of, with_meshes
 
-# The grey of the texture, sRGB-encoded, and the linear value that it stands for (IEC 61966-2-1).
+# The grey of the texture, sRGB-encoded, and the linear value that it stands for (IEC 61966-2-1). The file holds floats, because
+# drivers decode 8-bit codes with errors of their own.
 GREY = 188
 LINEAR = ((GREY / 255 + 0.055) / 1.055) ** 2.4
 
 
 def _picture(scene: Scene, draw: Draw) -> NDArray[Any]:
     with TemporaryDirectory(prefix="glshade-") as folder:
-        grey = Path(folder) / "grey.png"
-        Image(np.full((4, 4, 3), GREY, dtype=np.uint8), "srgb").save(grey)
+        grey = Path(folder) / "grey.exr"
+        Image(np.full((4, 4, 3), GREY / 255, dtype=np.float32)).save(grey)
 
         def textured(item: Object) -> Object | None:
             if mesh_of(item).uvs is None:
@@ -41,7 +43,7 @@ def _textured(material: Brdf, grey: Path) -> Brdf:
         update={
             name: Texture(texture=grey, factor=np.divide(value, LINEAR).tolist(), encoding="srgb")
             for name in (*material.parameters(), "emission")
-            if (value := getattr(material, name)) is not None and not isinstance(value, Texture)
+            if (value := getattr(material, name)) is not None and not isinstance(value, Texture | Spectrum)
         }
     )
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import sys
 from pathlib import Path
+from time import monotonic
 from typing import Any
 
 import numpy as np
@@ -12,13 +14,14 @@ import pytest
 
 from glshade import Renderer, load
 from glshade.bench import peers
-from glshade.bench.contest import SAME, ContestRow, apart, in_turn, row, run_contest, target
-from glshade.bench.entrants import Cold, Files, ProgramError, RoundTimes, enter, pictures_took, read_codes
+from glshade.bench.contest import SAME, ContestRow, ContestTable, apart, in_turn, measure_work, row, run_contest, target
+from glshade.bench.entrants import Cold, Files, RoundTimes, enter, pictures_took, read_codes, reports
 from glshade.bench.growth import AN_OBJECT, SERIES, Growth, fitted, measure_growth
 from glshade.bench.jobs import Jobs
+from glshade.bench.process import Conversation, ProgramError, fault, timed
 from glshade.bench.report import SCHEMA, BenchReport, markdown
 from glshade.bench.stage import TURN, WorkFiles, eye, set_up, sphere
-from glshade.bench.works import BY_HAND, FASTEST, GLSHADE, WORKS, Work
+from glshade.bench.works import BY_HAND, DOOR, FASTEST, GLSHADE, WORKS
 from glshade.driver.clock import Spread
 from glshade.scene.file import SceneFile
 
@@ -75,7 +78,7 @@ class TestPrograms:
     # W1 is slow here because test_work_is_the_default_subcommand draws it as well.
     @pytest.mark.parametrize("name", [pytest.param("W1", marks=pytest.mark.slow), "W2"])
     def test_the_peer_by_hand_draws_the_same_picture(self, name: str) -> None:
-        ours, hand = run_contest(SMALL[name], [BY_HAND], repeat=1)
+        ours, hand = measure_work(name, [BY_HAND], repeat=1, small=True).rows
         assert (ours.program, hand.program) == (GLSHADE, BY_HAND)
         assert ours.driver == hand.driver
         assert hand.codes is not None
@@ -113,8 +116,8 @@ class TestPrograms:
 
     @pytest.mark.slow
     def test_every_installed_peer(self) -> None:
-        rows = {result.program: result for result in run_contest(SMALL["W1"], peers.installed(), repeat=1)}
-        assert set(rows) == {GLSHADE, *peers.installed()}
+        rows = {result.program: result for result in measure_work("W1", peers.installed(), repeat=1, small=True).rows}
+        assert set(rows) == {GLSHADE, *peers.installed()} - set(peers.VIEWERS)
         for name in {"moderngl", "panda3d", "vtk"} & set(rows):
             assert rows[name].same, rows[name]
         for name in {"mitsuba", "pyrender"} & set(rows):
@@ -128,19 +131,71 @@ class TestPrograms:
             enter("nobody", SMALL["W1"], stage, tmp_path)
         with pytest.raises(ProgramError, match="nobody ended early"):
             Cold("nobody", SMALL["W5"], stage, tmp_path).round()
-        fault = run_contest(SMALL["W1"], ["nobody"], repeat=1)[1]
-        assert (fault.program, fault.seconds) == ("nobody", None)
-        assert fault.fault
+        left_out = measure_work("W1", ["nobody"], repeat=1, small=True).rows[1]
+        assert (left_out.program, left_out.seconds) == ("nobody", None)
+        assert left_out.fault
 
     def test_the_time_that_a_command_reports(self) -> None:
         assert pictures_took([{"event": "begin"}, {"event": "end", "seconds": 3.0, "seconds_pictures": 2.5}]) == 2.5
         with pytest.raises(ProgramError, match="did not say"):
             pictures_took([{"event": "end", "seconds": 3.0}])
+        assert reports('{"event": "begin"}\n') == [{"event": "begin"}]
+        with pytest.raises(ProgramError, match="not JSON"):
+            reports("Segmentation fault\n")
 
     def test_a_file_that_is_no_picture_is_an_error(self, tmp_path: Path) -> None:
         (tmp_path / "x.png").write_bytes(b"not a picture")
         with pytest.raises(ProgramError, match="not a picture"):
             read_codes(tmp_path / "x.png")
+
+
+PYTHON = [sys.executable, "-c"]
+
+
+class TestProcess:
+    """Processes that fail, crash, or hang."""
+
+    def test_a_command_is_timed_and_its_memory_is_that_of_its_largest_process(self) -> None:
+        child = [*PYTHON, "x = b'x' * 300_000_000"]
+        run = timed([*PYTHON, f"import subprocess; subprocess.run({child})"], "it")
+        assert run.seconds > 0
+        assert 300e6 < run.peak < 400e6
+        # This process has more memory than the command, whose peak is its own nevertheless.
+        assert timed([*PYTHON, "print('done')"], "it").peak < 50e6
+
+    def test_a_crash_is_told_by_its_signal_and_last_words(self) -> None:
+        crash = "import os, sys; print('LLVM ERROR: Cannot select', file=sys.stderr, flush=True); os.abort()"
+        with pytest.raises(ProgramError, match=r"it ended early by SIGABRT: LLVM ERROR: Cannot select; .*Debian: libllvm19"):
+            timed([*PYTHON, crash], "it")
+        with pytest.raises(ProgramError, match=r"it ended early by SIGABRT: LLVM ERROR"):
+            Conversation("it", [*PYTHON, crash])
+        with pytest.raises(ProgramError, match=r"it ended early by SIGSEGV: it printed nothing"):
+            timed([*PYTHON, "import os, signal; os.kill(os.getpid(), signal.SIGSEGV)"], "it")
+        assert fault("it", "a\nb\n", -200) == "it ended early by signal 200: b"
+
+    def test_a_process_may_crash_between_two_answers(self) -> None:
+        talk = Conversation(
+            "it", [*PYTHON, "print(1, flush=True); input(); print(2, flush=True); input(); raise OSError('oh')"]
+        )
+        assert (talk.first, talk.ask("x")) == (1, 2)
+        with pytest.raises(ProgramError, match="it ended early: OSError: oh"):
+            talk.ask("y")
+        talk.close()
+
+    def test_a_program_that_hangs_is_ended(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        monkeypatch.setattr("glshade.bench.process.PATIENCE", 0.3)
+        for start in (lambda: timed(["sleep", "60"], "it"), lambda: Conversation("it", ["sleep", "60"])):
+            before = monotonic()
+            with pytest.raises(ProgramError, match=r"it took longer than 0\.3 s and was ended"):
+                start()
+            assert monotonic() - before < 30
+
+    def test_what_is_not_there_or_not_json_is_an_error(self) -> None:
+        for start in (lambda: timed(["/no/such/program"], "it"), lambda: Conversation("it", ["/no/such/program"])):
+            with pytest.raises(ProgramError, match=r"it .*No such file"):
+                start()
+        with pytest.raises(ProgramError, match="not JSON"):
+            Conversation("it", ["echo", "hello"])
 
 
 class Fake:
@@ -185,27 +240,51 @@ class TestRounds:
         assert faults == {"b": "b ended early: oh"}
         with pytest.raises(ProgramError):
             in_turn({GLSHADE: Fake(GLSHADE, log, ProgramError("no"))}, 1, {})
+        alone = run_contest({}, ["b"], lambda name, folder: Fake(name, log, 1, ProgramError("no")), 1)
+        assert [(result.program, result.fault) for result in alone] == [(GLSHADE, "no")]
+
+    def test_a_program_without_a_picture_is_a_fault_of_that_program(self) -> None:
+        class Blind(Fake):
+            def picture(self) -> Any:
+                raise FileNotFoundError("no picture")
+
+        kinds = {GLSHADE: Fake, "b": Blind}
+        rows = run_contest({}, ["b"], lambda name, folder: kinds[name](name, [], 1, 1), 1)
+        assert [(result.program, result.fault) for result in rows] == [(GLSHADE, None), ("b", "no picture")]
 
     def test_ratios_are_of_the_same_round(self) -> None:
         timings = {
             GLSHADE: [RoundTimes(1.0), RoundTimes(4.0), RoundTimes(2.0)],
             "b": [RoundTimes(2.0), RoundTimes(4.0), RoundTimes(8.0)],
         }
-        assert row("b", timings, None, 0).ratio == Spread(0.5, 0.25, 1.0)
-        assert row(GLSHADE, timings, None, 0).ratio is None
-        assert row("b", timings, None, 0).whole is None
-        whole = {GLSHADE: [RoundTimes(1.0, 3.0)], "b": [RoundTimes(2.0, 5.0)]}
-        assert row("b", whole, None, 0).whole == Spread(5.0, 5.0, 5.0)
+        none: dict[str, Any] = {GLSHADE: None, "b": None}
+        assert row("b", timings, None, none).ratio == Spread(0.5, 0.25, 1.0)
+        assert row(GLSHADE, timings, None, none).ratio is None
+        assert row("b", timings, None, none).whole is None
+        assert row("b", timings, None, none).codes is None
+        whole = {GLSHADE: [RoundTimes(1.0, 3.0)], "b": [RoundTimes(2.0, 5.0, 70), RoundTimes(2.0, 5.0, 80)][:1]}
+        assert row("b", whole, None, none).whole == Spread(5.0, 5.0, 5.0)
+        assert row("b", whole, None, none).peak == 70
+
+    def test_pyrender_is_compared_with_the_replacement_of_its_renderer(self) -> None:
+        timings = {GLSHADE: [RoundTimes(1.0)], DOOR: [RoundTimes(3.0)], "pyrender": [RoundTimes(6.0)], "b": [RoundTimes(2.0)]}
+        pictures: dict[str, Any] = {name: np.full((1, 1, 3), code, np.uint8) for code, name in enumerate(timings)}
+        result = row("pyrender", timings, None, pictures)
+        assert (result.ratio, result.beside, result.codes) == (Spread(0.5, 0.5, 0.5), DOOR, 1)
+        assert row("b", timings, None, pictures).beside == GLSHADE
+        assert row(DOOR, timings, None, pictures).ratio is None
+        without = {name: times for name, times in timings.items() if name != DOOR}
+        assert row("pyrender", without, None, {name: pictures[name] for name in without}).beside == GLSHADE
 
     def test_the_strictest_target_applies(self) -> None:
         def done(name: str, seconds: float, codes: int = 0) -> ContestRow:
             return ContestRow(name, seconds=Spread(seconds, seconds, seconds), codes=codes)
 
         rows = [done(GLSHADE, 1), done("b", 2), done("c", 3), done("d", 4, codes=9)]
-        work = Work("", targets={"c": 0.5, "d": 0.3, FASTEST: 0.4})
-        assert [target(work, result, rows) for result in rows] == [None, 0.4, 0.5, 0.3]
-        work = Work("", targets={"c": 0.5, "peers": 1.0})
-        assert [target(work, result, rows) for result in rows] == [None, 1.0, 0.5, None]
+        targets = {"c": 0.5, "d": 0.3, FASTEST: 0.4}
+        assert [target(targets, result, rows) for result in rows] == [None, 0.4, 0.5, 0.3]
+        targets = {"c": 0.5, "peers": 1.0}
+        assert [target(targets, result, rows) for result in rows] == [None, 1.0, 0.5, None]
 
     def test_a_target_is_met_or_not(self) -> None:
         ratio = Spread(0.5, 0.1, 0.9)
@@ -283,12 +362,13 @@ class TestReport:
     def report(self) -> BenchReport:
         two = Spread(2.0, 1.0, 3.0)
         rows = [
-            ContestRow(GLSHADE, "driver", two, Spread(1.6, 1.5, 1.7), codes=0),
+            ContestRow(GLSHADE, "driver", two, Spread(1.6, 1.5, 1.7), codes=0, peak=120_000_000),
             ContestRow(BY_HAND, "driver", Spread(4.0, 3.0, 5.0), two, Spread(0.5, 0.4, 0.6), target=0.4, codes=1),
             ContestRow("vtk", fault="vtk ended early: oh"),
         ]
         jobs = Jobs.of(100, {1: [RoundTimes(2.0), RoundTimes(4.0)], 2: [RoundTimes(1.0), RoundTimes(2.0)]})
-        return BenchReport(2, False, {"W4": rows}, [TestGrowth.series("objects", 1e-3, 1e-3 + 1e-4)], jobs)
+        table = ContestTable("frames", rows, "s", limit=1.5, memory=110_000_000)
+        return BenchReport(2, False, {"W4": table}, [TestGrowth.series("objects", 1e-3, 1e-3 + 1e-4)], jobs)
 
     def test_jobs_are_compared_in_frames_a_second_round_by_round(self) -> None:
         jobs = Jobs.of(100, {1: [RoundTimes(2.0), RoundTimes(4.0)], 2: [RoundTimes(1.0), RoundTimes(4.0)]})
@@ -312,11 +392,12 @@ class TestReport:
     def test_tables(self, report: BenchReport) -> None:
         text = markdown(report)
         for line in (
-            "| program | s | range | whole command | ratio | range | target | picture |",
-            "| glshade | 2.00 | 1.00 to 3.00 | 1.60 s (<= 1.5 s: no) |  |  |  |  |",
-            "| moderngl by hand | 4.00 | 3.00 to 5.00 | 2.00 s | 0.50 | 0.40 to 0.60 | <= 0.40: no | the same |",
-            "| vtk | - | - | - | - | - | - | vtk ended early: oh |",
-            "| objects | 1, 10 | 1 1.1 | 11.1 us | 0.04 | 0.04 | <= 1.15, <= 30 us each: yes |",
+            "### W4: frames",
+            "| program | s | range | whole command | ratio | range | target | MB | picture |",
+            "| glshade | 2.00 | 1.00 to 3.00 | 1.60 s |  |  | <= 1.5 s: no | 120 (<= 110: no) |  |",
+            "| moderngl by hand | 4.00 | 3.00 to 5.00 | 2.00 s | 0.50 | 0.40 to 0.60 | <= 0.40: no |  | the same |",
+            "| vtk | - | - | - | - | - | - | - | vtk ended early: oh |",
+            "| objects | 1, 10 | 1 1.1 | 11.1 us | 0.04 | 0.04 | <= 1.1, <= 30 us each: yes |",
             "| 2 | 75.0 | 50.0 to 100 | 2.00 | 2.00 to 2.00 | >= 1.4: yes |",
         ):
             assert line in text.splitlines()

@@ -75,7 +75,8 @@ class TestBrdfs:
 
     def test_keys_are_an_interface(self) -> None:
         keys = (
-            "name class summary description source anisotropic parameters options laws shares isotropic_where limits reference"
+            "name class summary description source anisotropic parameters options keys laws shares isotropic_where limits "
+            "reference"
         )
         assert list(listing.brdf("phong")) == keys.split()
         assert {"name", "type", "default", "low", "high", "usual", "unit", "description", "same_as", "base"} <= set(
@@ -85,6 +86,15 @@ class TestBrdfs:
         assert list(listing.light("spot")) == keys.split()
         keys = "name description source brdf material swatch"
         assert list(listing.preset("gold")) == keys.split()
+
+    def test_keys_that_are_neither_parameters_nor_options_are_listed(self, run: Any) -> None:
+        assert {key["name"]: key["takes"] for key in listing.brdf("measured")["keys"]} == {
+            "file": "path",
+            "reciprocity": '"kept", "enforced"',
+        }
+        assert listing.brdf("phong")["keys"] == []
+        _, out, _ = run("brdfs", "measured")
+        assert any(line.split()[:2] == ["file", "path"] for line in out.splitlines())
 
     def test_one_line_for_each_model(self, run: Any) -> None:
         code, out, _ = run("brdfs")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ PERFECT: dict[str, Any] = {
     "clips_at_sides": False,
     "level_of_detail": {"rule": "length", "error": 0.0},
     "filter_weight_error": 0.0,
+    "srgb_decoding": {"error": 0.0, "values": [0.0] * 256},
+    "table_weight_error": 0.0,
 }
 
 
@@ -32,6 +35,12 @@ def test_llvmpipe_is_measured_to_have_the_errors_that_its_tolerance_was_recorded
     assert measured.name == context.renderer
     assert (measured.plane, measured.window, measured.snap) == (LLVMPIPE.plane, LLVMPIPE.window, LLVMPIPE.snap)
     assert (measured.rules, measured.texel, measured.clips) == (LLVMPIPE.rules, LLVMPIPE.texel, LLVMPIPE.clips)
+    assert measured.table == LLVMPIPE.table
+    # llvmpipe decodes sRGB by a polynomial, which is off by up to 0.34 codes.
+    assert 0.34 < measured.decoding <= LLVMPIPE.decoding
+    assert len(measured.decoded) == 256
+    # JSON holds the error in place of the values.
+    assert Freedom.from_dict(measured.as_dict()) == replace(measured, decoded=())
     # The logarithm of llvmpipe is off by up to half of the largest value of log2(1 + m) - m.
     assert 0.0430 < measured.level <= LLVMPIPE.level
 
@@ -57,6 +66,7 @@ CASES: dict[str, tuple[str, Any, dict[str, Any]]] = {
     "clipping": ("clips_at_sides", True, {"clips": True}),
     "clipping that cannot be seen": ("clips_at_sides", None, {"clips": True}),
     "weights of 8 bits": ("filter_weight_error", 1 / 512, {"texel": pytest.approx(1 / 512, rel=0.2)}),
+    "weights of 8 bits in tables": ("table_weight_error", 1 / 512, {"table": pytest.approx(1 / 512, rel=0.2)}),
     "another rule": (
         "level_of_detail",
         {"rule": "largest", "error": 0.02},

@@ -22,7 +22,7 @@ def test_the_result_is_json(found: dict[str, Any]) -> None:
     assert list(found) == [
         *("built_ins", "fma", "contracted", "precise", "compensated_sum_without_precise", "mix_at_its_end", "denormals"),
         *("loop_rounds", "formats", "timer_query", "subpixel_bits", "interpolation_shift_in_steps", "clips_at_sides"),
-        *("sample_positions", "level_of_detail", "filter_weight_error"),
+        *("sample_positions", "level_of_detail", "filter_weight_error", "srgb_decoding", "table_weight_error"),
     ]
 
 

@@ -73,7 +73,9 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Any:
     red = {"brdf": "phong", "kd": (0.6, 0.1, 0.05), "ks": 0.4, "exponent": 20.0, "ka": (0.5, 0.5, 0.5)}
 
     def make(lights: Any = LIGHTS, camera: Any = CAMERA, **film: Any) -> g.Scene:
-        film = {"size": SIZE, "background": (0.1, 0.2, 0.3), "aovs": AOVS, **film}
+        # A textured surface has no spectrum.
+        aovs = [name for name in AOVS if name != "spectrum"]
+        film = {"size": SIZE, "background": (0.1, 0.2, 0.3), "aovs": aovs, **film}
         return g.Scene.model_validate(
             {"film": film, "camera": camera, "objects": objects, "lights": lights, "materials": {"red": red}}
         )

@@ -85,7 +85,8 @@ def test_large_scenes_are_not_kept(monkeypatch: pytest.MonkeyPatch, limited: Cal
 
 
 def test_textures_die(limited: Callable[..., Renderer], tmp_path: Path) -> None:
-    size = 4 * 4 * 4 * 4 * 4 // 3
+    # 4 x 4, 2 x 2 and 1 texel of 4 bytes.
+    size = (16 + 4 + 1) * 4
     renderer = limited(TEXTURES=10 * size)
     first = tmp_path / "first.png"
     Image(np.full((4, 4, 3), 128, dtype=np.uint8), "srgb").save(first)
@@ -101,7 +102,8 @@ def test_textures_die(limited: Callable[..., Renderer], tmp_path: Path) -> None:
 
 def test_a_texture_that_changes_does_not_stay(limited: Callable[..., Renderer], tmp_path: Path) -> None:
     """A file that is written again and again is a new texture each time."""
-    size = 4 * 4 * 4 * 4 * 4 // 3
+    # Linear colours of 8 bits take 8 bytes a texel.
+    size = (16 + 4 + 1) * 8
     renderer = limited(TEXTURES=2 * size)
     path = tmp_path / "changes.png"
     for number in range(20):

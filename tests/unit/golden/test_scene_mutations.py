@@ -19,7 +19,7 @@ from glshade.verification.mutations import MUTATIONS, Mutation
 from glshade.verification.trials import VISIBLE
 
 # Scenes in which, together, every mutation shows, and the width of their pictures [pixels].
-SCENES, WIDTH = ("simple-model", "falloff", "detail", "anisotropy", "perspective-viewer", "emission"), 160
+SCENES, WIDTH = ("simple-model", "falloff", "detail", "anisotropy", "perspective-viewer", "emission", "measured"), 160
 # The share of the visible faults whose cause must be named.
 NAMED = 0.9
 

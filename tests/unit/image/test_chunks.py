@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -34,6 +35,21 @@ def test_every_file_that_ends_within_its_pixels_is_refused(png: bytes, share: fl
     end = len(SIGNATURE) + int(share * (len(png) - 12 - len(SIGNATURE)))
     with pytest.raises(OSError, match="is a truncated PNG file"):
         check_chunks(png[:end])
+
+
+def test_files_that_end_between_two_chunks_of_pixels_are_refused() -> None:
+    """Pixels may lie in several chunks, and a file may be cut just behind one of them."""
+
+    def chunk(name: bytes, data: bytes) -> bytes:
+        return len(data).to_bytes(4, "big") + name + data + zlib.crc32(name + data).to_bytes(4, "big")
+
+    packed = zlib.compress(bytes(range(256)))
+    begin = SIGNATURE + chunk(b"IHDR", bytes(13))
+    half, rest = chunk(b"IDAT", packed[:99]), chunk(b"IDAT", packed[99:])
+    check_chunks(begin + half + rest)
+    for end in range(len(rest)):
+        with pytest.raises(OSError, match="is a truncated PNG file"):
+            check_chunks(begin + half + rest[:end])
 
 
 @given(data=st.data())

@@ -226,7 +226,7 @@ def test_local_order_brings_neighbours_together() -> None:
 
 
 def test_a_mesh_in_local_order_stays_the_same_object() -> None:
-    ball = primitives.icosphere(3)
+    ball = in_local_order(primitives.icosphere(3))
     assert in_local_order(ball) is ball
     reread = Mesh.build(ball.positions, ball.triangles)  # as from a cache: nobody says that it is in order
     assert in_local_order(reread) is reread

@@ -235,23 +235,58 @@ def test_triangles_strips_and_fans(mode: int, order: Any, triangles: Any) -> Non
     assert rotated[0] == rotated[1]
 
 
-def test_points_and_lines_become_strips_as_wide_as_pixels() -> None:
+def test_lines_become_strips_as_wide_as_pixels() -> None:
     """The camera is at a distance of 4, with a field of view of 1 radian over 480 pixels."""
     pixel = 2 * math.tan(0.5) * 4 / 480
-    dots, line = (from_pyrender(stage(node(square(mode=mode)))).objects[0].mesh for mode in (0, 2))
-    assert isinstance(dots, glshade.Mesh)
+    line = from_pyrender(stage(node(square(mode=2)))).objects[0].mesh
     assert isinstance(line, glshade.Mesh)
-    assert len(dots.triangles) == 6 * 2
-    np.testing.assert_allclose(np.ptp(dots.positions[:4], axis=0), [pixel, pixel, 0], rtol=1e-4, atol=1e-7)
     # The line is a closed loop through the six corners of two triangles.
     assert len(line.triangles) == 6 * 2
     np.testing.assert_allclose(np.ptp(line.positions[:4], axis=0), [2, pixel, 0], rtol=1e-4, atol=1e-7)
 
 
-def test_points_need_a_camera() -> None:
-    blind = stage(node(square(mode=0), square()))
+def test_points_stay_points() -> None:
+    given = square(mode=0)
+    scene = from_pyrender(stage(node(given)))
+    dots = scene.objects[0].mesh
+    assert isinstance(dots, glshade.Mesh)
+    assert dots.strokes is not None
+    # The square lists the corners of two triangles, so that two of its points are drawn twice.
+    np.testing.assert_array_equal(dots.strokes, np.stack([given.indices.reshape(-1)] * 2, axis=1))
+    np.testing.assert_array_equal(dots.positions, given.positions)
+    assert scene.film.point_size == 1
+
+
+def test_points_that_are_not_finite_are_left_out() -> None:
+    given = square(mode=0)
+    given.positions = given.positions.copy()
+    given.positions[1, 1] = np.nan
+    lost = int((given.indices == 1).sum())
+    with pytest.warns(AssetWarning, match=f"{lost} points that are not finite are left out"):
+        dots = from_pyrender(stage(node(given))).objects[0].mesh
+    assert isinstance(dots, glshade.Mesh)
+    assert len(dots.positions) == 3
+
+
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_normals_of_points_do_not_turn_to_the_viewer(offscreen: OffscreenRenderer, mirror: float) -> None:
+    """As in pyrender, a light behind the viewer does not reach points whose normals point away from both."""
+
+    def brightest(z: float) -> int:
+        dots = square(mode=0, normals=np.tile([0.0, 0.0, z], (len(SQUARE), 1)), material=rough(metallicFactor=0.0))
+        sun = Thing(light=Thing(color=np.ones(3), intensity=9.0, name=None), pose=moved(z=5), name=None)
+        pose = np.diag([mirror, 1.0, 1.0, 1.0])
+        shown = stage(node(dots, pose=pose), directional_light_nodes={sun}, bg_color=np.zeros(4))
+        return int(offscreen.render(shown)[0].max())
+
+    assert brightest(1) > 50
+    assert brightest(-1) == 0
+
+
+def test_lines_need_a_camera() -> None:
+    blind = stage(node(square(mode=1)), node(square()))
     blind.main_camera_node = None
-    with pytest.warns(AssetWarning, match="points and lines are left out"):
+    with pytest.warns(AssetWarning, match="lines are left out"):
         assert len(from_pyrender(blind).objects) == 1
     with pytest.raises(SceneError, match="nothing to draw"):
         from_pyrender(stage())
@@ -273,6 +308,36 @@ def test_instances_and_invisible_meshes() -> None:
     # The third pose flattens the mesh, which then covers no pixel.
     places = {tuple(item.transform.array()[:3, 3]) for item in scene.objects}
     assert places == {(1, 0, 3), (0, 2, 3)}
+
+
+def many(count: int = 40) -> Any:
+    """Returns poses (N, 4, 4) of small squares that stand beside each other; the last one flattens its square."""
+    small = np.diag([0.1, 0.1, 0.1, 1.0])
+    places = [moved(x=0.3 * (n % 8) - 1, y=0.3 * (n // 8) - 0.6, z=0.01 * n) @ small for n in range(count)]
+    return np.stack([*places, np.zeros((4, 4))])
+
+
+def test_instances_are_one_object_with_one_draw_call(offscreen: OffscreenRenderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    poses = many()
+    together = stage(node(square(poses=poses), pose=moved(x=0.1)), camera=perspective(), ambient_light=np.ones(3))
+    apart = stage(*(node(square(), pose=moved(x=0.1) @ pose) for pose in poses[:-1]), ambient_light=np.ones(3))
+    drawn = offscreen.render(together)
+    for found, expected in zip(drawn, offscreen.render(apart), strict=True):
+        np.testing.assert_array_equal(found, expected)
+    assert drawn[1].std() > 0
+    offscreen.render(together)
+    # Where the camera moves, nothing is assembled, and where the poses change, nothing is compiled.
+    with monkeypatch.context() as patched:
+        patched.setattr("glshade.gl.renderer.ready", lambda *arguments: pytest.fail("the scene was assembled again"))
+        together.main_camera_node.pose = moved(z=5)
+        farther = offscreen.render(together)
+    assert not np.array_equal(farther[1], drawn[1])
+    with monkeypatch.context() as patched:
+        patched.setattr("glshade.gl.resources.Program", lambda *arguments: pytest.fail("a program was compiled"))
+        poses[:, 1, 3] += 0.2
+        assert not np.array_equal(offscreen.render(together)[1], farther[1])
+    apart = stage(*(node(square(), pose=moved(x=0.1) @ pose) for pose in poses[:-1]), ambient_light=np.ones(3), at=moved(z=5))
+    np.testing.assert_array_equal(offscreen.render(together)[1], offscreen.render(apart)[1])
 
 
 def test_names_are_kept_and_numbered() -> None:

@@ -26,6 +26,7 @@ number = st.floats(0, 1e3)
         rules=st.lists(st.sampled_from(["largest", "length", "sum"]), min_size=1, max_size=3).map(tuple),
         level=number,
         texel=number,
+        table=number,
         clips=st.booleans(),
         subpixel_bits=st.integers(4, 32),
         samples=st.integers(0, 64),

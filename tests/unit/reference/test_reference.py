@@ -13,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from glshade import Image, Mesh, Renderer, Scene, reference
+from glshade.driver.freedom import measure_freedom
 from glshade.mesh.primitives import plane, sphere, torus
 from glshade.radiance.sampler import Sampler
 from glshade.reference import clip
@@ -394,8 +395,9 @@ def outside(renderer: Renderer, view: Scene, **options: Any) -> NDArray[np.bool_
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         gpu = renderer.render(view, dtype="float32", **options).pixels
-    shifts = np.linspace(-0.1, 0.1, 9)
-    shifted = [reference.radiance(view, sampling=Sampling(level=shift), **options) for shift in shifts]
+    decoded = measure_freedom(renderer.context).decoded
+    conditions = [Sampling(level=shift, decoded=decoded) for shift in np.linspace(-0.1, 0.1, 9)]
+    shifted = [reference.radiance(view, sampling=sampling, **options) for sampling in conditions]
     assert (shifted[0][..., 3] > 0).mean() > 0.1
     low, high = np.min(shifted, axis=0) - CLOSE, np.max(shifted, axis=0) + CLOSE
     result: NDArray[np.bool_] = ((gpu < low) | (gpu > high)).any(axis=2)

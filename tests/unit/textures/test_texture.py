@@ -12,7 +12,7 @@ import pytest
 
 from glshade import Image, Mesh, Texture
 from glshade.gl.preparation import ApproximateWarning
-from glshade.gl.textures import levels
+from glshade.textures.mipmap import levels
 
 CORNERS = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], dtype=float)
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -64,7 +64,9 @@ def test_8_bit_files_are_decoded(draw: Any, tmp_path: Path) -> None:
     Image(np.full((2, 2, 3), [188, 0, 255], dtype=np.uint8)).save(tmp_path / "t.png")
     for encoding, red in (("auto", 0.5029), ("srgb", 0.5029), ("linear", 188 / 255)):
         pixels = draw(square(kd={"texture": tmp_path / "t.png", "encoding": encoding}), SKY, camera=FRONT)
-        assert pixels == pytest.approx(np.broadcast_to([red, 0, 1], (32, 32, 3)), abs=1e-4), encoding
+        # A driver may decode sRGB codes with an error of half a code, which is 2.8e-3 at this code.
+        allowed = 1e-6 if encoding == "linear" else 2.8e-3
+        assert pixels == pytest.approx(np.broadcast_to([red, 0, 1], (32, 32, 3)), abs=allowed), encoding
 
 
 def test_filtering_is_done_in_linear_light(draw: Any, tmp_path: Path) -> None:

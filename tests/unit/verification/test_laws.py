@@ -12,6 +12,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import pytest
 from hypothesis import given, settings
+from support.planted import not_welded
 from support.strategies import scenes
 
 import glshade as g
@@ -207,7 +208,7 @@ def objects_reordered(patch: pytest.MonkeyPatch) -> None:
     def pieces(*arguments: Any) -> Any:
         found, objects = original(*arguments)
         first = {piece.material.brdf: piece.material for piece in reversed(found)}
-        return [replace(piece, material=first[piece.material.brdf]) for piece in found], objects
+        return assembly._Pieces(replace(piece, material=first[piece.material.brdf]) for piece in found), objects
 
     patch.setattr(assembly, "_pieces", pieces)
 
@@ -265,7 +266,7 @@ def rotations(patch: pytest.MonkeyPatch) -> None:
 def triangles_reordered(patch: pytest.MonkeyPatch) -> None:
     """A smooth normal is that of the first triangle at the vertex."""
 
-    def first(mesh: Any, label: Any, count: int, faces: Any) -> Any:
+    def first(faces: Any, angles: Any, label: Any, count: int) -> Any:
         found = np.zeros((count, 3))
         found[label[::-1]] = np.repeat(faces, 3, axis=0)[::-1]
         return found
@@ -275,7 +276,7 @@ def triangles_reordered(patch: pytest.MonkeyPatch) -> None:
 
 def unwelded(patch: pytest.MonkeyPatch) -> None:
     """Normals are smooth only between triangles that share vertices."""
-    patch.setattr(fans, "weld", lambda *columns: np.arange(len(columns[0])))
+    not_welded(patch)
 
 
 def baked(patch: pytest.MonkeyPatch) -> None:
@@ -306,8 +307,8 @@ def lights_linked(patch: pytest.MonkeyPatch) -> None:
     """All lights reach all objects."""
     original = assembly._instance
 
-    def instance(scene: g.Scene, piece: Any, view: Any, lights: Any, shading: Any) -> Any:
-        return original(scene, piece, view, tuple(x.model_copy(update={"only": None}) for x in lights), shading)
+    def instance(scene: g.Scene, piece: Any, view: Any, lights: Any, *more: Any) -> Any:
+        return original(scene, piece, view, tuple(x.model_copy(update={"only": None}) for x in lights), *more)
 
     patch.setattr(assembly, "_instance", instance)
 
