@@ -42,6 +42,7 @@ KINDS = {
     "tuple_type": "must be a list",
     "list_type": "must be a list",
     "string_type": "must be a string",
+    "path_type": "must be the path of a file",
     "int_from_float": "must be a whole number",
 }
 

@@ -95,8 +95,9 @@ class Observer:
     @classmethod
     def of_film(cls, film: Film) -> Observer:
         """Returns the observer of a film, which sees linear Rec. 709. Errors: AssetError."""
-        weights = rgb_weights() if film.white is None else weights_for(film.white.light())
-        return cls(weights, film.bands, film.white is None)
+        if film.white is None or film.white.spectrum == "D65":
+            return cls(rgb_weights(), film.bands, keeps_rgb=True)
+        return cls(weights_for(film.white.light()), film.bands, keeps_rgb=False)
 
     @classmethod
     def of_bands(cls, count: int, first: int) -> Observer:

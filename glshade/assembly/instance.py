@@ -83,6 +83,11 @@ class Instance:
         return bool(np.linalg.det(self.world_from_object[:3, :3]) < 0)
 
     @property
+    def has_bands(self) -> bool:
+        """Whether any of its light is drawn in bands of wavelengths, whose weights are negative in part."""
+        return any(share.weights is not None for share in self.shares)
+
+    @property
     def parts(self) -> tuple[Instance, ...]:
         """The instances whose light is added: one for each share, or the instance itself."""
         return self._of_shares if self.shares else (self,)

@@ -38,7 +38,8 @@ class Measured(Brdf):
     away from n. The table holds log2 f in half floats, at even steps of sqrt(theta_h), theta_d and phi_d, and is read with
     trilinear filtering. For retro-reflective data, l is mirrored at n first, which turns h into the back vector. Only isotropic
     data can be drawn. Values are drawn as they were measured, also where their errors let a surface reflect more light than
-    arrives; whether f(l, v) and f(v, l) may differ is up to `reciprocity`. The ambient reflectance ka is given by hand, because f says nothing about it.
+    arrives; whether f(l, v) and f(v, l) may differ is up to `reciprocity`. The ambient reflectance ka is given by hand, because
+    f says nothing about it.
     """
 
     source: ClassVar[str] = "Matusik et al. 2003; Rusinkiewicz 1998"

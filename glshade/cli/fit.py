@@ -63,6 +63,8 @@ def command(
     model = BRDFS[name]
     if not model.has_reference:
         raise click.BadParameter(f"{name} has only a GLSL file, and a fit needs its Python function", param_hint="'--model'")
+    if model.tables:
+        raise click.BadParameter(f"{name} is no formula with parameters, but a table of its own", param_hint="'--model'")
     fixed, start = changes(parameters, "'--parameter'"), changes(starts, "'--start'")
     for hint, table in (("'--parameter'", fixed), ("'--start'", start)):
         _check(model, table, hint)
@@ -95,7 +97,7 @@ def _print_material(file: Path, fit: Any) -> None:
     """Prints the material as a table of a scene file."""
     import json
 
-    name = re.sub(r"[^\w-]+", "_", file.stem) or "fitted"
+    name = re.sub(r"[^A-Za-z0-9_-]+", "_", file.stem) or "fitted"
     click.echo(f"[materials.{name}]")
     click.echo(f'brdf = "{fit.material.brdf}"')
     model = type(fit.material)

@@ -14,6 +14,8 @@ from glshade.errors import figure
 
 # The values of --kind: the kinds of panels, and "all" for all of them.
 KINDS = ("all", "polar", "lobe", "sphere", "furnace", "albedo", "fresnel")
+# The options that have an effect on the plots of materials only, not on that of a file of measurements.
+OF_MATERIALS = {"kinds", "parameters", "angles", "incidence", "azimuth", "quantity", "scale", "bare"}
 
 
 class Angles(click.ParamType[tuple[float, ...]]):
@@ -145,8 +147,10 @@ def command(
     from glshade.catalogue import figures as plots
     from glshade.cli._material import materials as named
 
-    if len(materials) == 1 and _is_measured(materials[0]):
-        _plot_measured(Path(materials[0]), output, fit)
+    files = [text for text in materials if _is_measured(text)]
+    if files:
+        _check_alone(files[0], materials)
+        _plot_measured(Path(files[0]), output, fit)
         return
     wanted: Any = plots.KINDS if not kinds or "all" in kinds else tuple(dict.fromkeys(kinds))
     if bare and (len(wanted) != 1 or wanted[0] not in plots.PICTURES):
@@ -188,8 +192,26 @@ def command(
 
 
 def _is_measured(text: str) -> bool:
-    """Returns whether a text of the command line names a file of measured reflectance: a file that is no scene."""
-    return Path(text).suffix.lower() not in ("", ".toml", ".json") and ":" not in text and Path(text).is_file()
+    """Returns whether a text of the command line names a file of measured reflectance: a file that is no scene, or a missing
+    file with the suffix of such a format.
+    """
+    from glshade.measured.formats import FORMATS
+
+    suffix = Path(text).suffix.lower()
+    if suffix in ("", ".toml", ".json") or ":" in text:
+        return False
+    return suffix.removeprefix(".") in FORMATS or Path(text).is_file()
+
+
+def _check_alone(file: str, materials: tuple[str, ...]) -> None:
+    """Refuses materials and options that have no effect on the plot of a file. Errors: click.UsageError."""
+    if len(materials) > 1:
+        raise click.UsageError(f"{file} is a file of measurements, which is plotted alone, beside the model of --fit")
+    context = click.get_current_context()
+    for option in context.command.params:
+        given = context.get_parameter_source(option.name or "") is click.core.ParameterSource.COMMANDLINE
+        if given and option.name in OF_MATERIALS:
+            raise click.UsageError(f"{max(option.opts, key=len)} has no effect on the plot of a file of measurements")
 
 
 def _plot_measured(file: Path, output: Path | None, name: str) -> None:
@@ -206,8 +228,9 @@ def _plot_measured(file: Path, output: Path | None, name: str) -> None:
     output = output or Path(file.stem + ".svg")
     figures.check()
     figures.check_suffix(output)
-    if name not in BRDFS or not BRDFS[name].has_reference:
-        raise click.BadParameter(f"no model that can be fitted is named {name!r}{nearest(name, BRDFS)}", param_hint="'--fit'")
+    fitted = [known for known in BRDFS if BRDFS[known].has_reference and not BRDFS[known].tables]
+    if name not in fitted:
+        raise click.BadParameter(f"no model that can be fitted is named {name!r}{nearest(name, fitted)}", param_hint="'--fit'")
     measurement = read(file)
     grained = isinstance(measurement, Samples) and is_grained(measurement)
     samples = points(measurement, 20_000)

@@ -53,7 +53,7 @@ def draw_points(context: Context, program: Any, vertices: moderngl.VertexArray, 
     """
     target = context.gl.fbo
     x, y, width, height = target.viewport
-    margin = math.ceil(side / 2) + 1
+    margin = _margin(side)
     smaller = np.array([[width / (width + 2 * margin)], [height / (height + 2 * margin)], [1.0], [1.0]])
     program.write("u_clip_from_world", rounded(clip * smaller))
     target.viewport = (x - margin, y - margin, width + 2 * margin, height + 2 * margin)
@@ -63,12 +63,21 @@ def draw_points(context: Context, program: Any, vertices: moderngl.VertexArray, 
     program.write("u_clip_from_world", clip)
 
 
-def are_squares(context: Context, side: float) -> bool:
+def _margin(side: float) -> int:
+    """Returns by how much the viewport is enlarged on each side for points of a side [pixels]."""
+    return math.ceil(side / 2) + 1
+
+
+def are_squares(context: Context, side: float, size: tuple[int, int]) -> bool:
     """Returns whether the driver draws points of a side [pixels] as the squares that are drawn as two triangles each.
 
     It is tested once for each side, with one sample a pixel and with several. A driver may limit the size of points, round it,
     or draw disks. The context must be current.
+    size: width, height of the picture [pixels]. One that is about as large as the driver allows leaves no room for the viewport
+        to be enlarged.
     """
+    if max(size) + 2 * _margin(side) > context.largest_side:
+        return False
     known = _tested.setdefault(context, {})
     if side not in known:
         known[side] = all(_draws_alike(context, side, samples) for samples in (0, min(4, context.gl.max_samples)))

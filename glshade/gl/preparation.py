@@ -145,8 +145,7 @@ class Prepared:
             return "rgba32f"
         if chosen == "r11f_g11f_b10f" and any(light.is_negative for light in self.assembly.lights):
             raise SceneError("quality.storage: r11f_g11f_b10f has nothing below zero, and a light of this scene is negative")
-        bands = any(share.weights is not None for instance in self.assembly.instances for share in instance.shares)
-        if bands and chosen in UNSIGNED:
+        if chosen in UNSIGNED and any(instance.has_bands for instance in self.assembly.instances):
             raise SceneError(f"quality.storage: {chosen} has nothing below zero, which bands of wavelengths need")
         if FORMATS[chosen][1] == 3 and (len(self.scene.film.background) == 4 or self.blends):
             raise SceneError(f"quality.storage: {chosen} has no alpha, which this scene asks for")

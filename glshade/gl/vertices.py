@@ -59,7 +59,7 @@ class Vertices:
         arrays = self._arrays.setdefault(mesh, WeakKeyDictionary())
         if program not in arrays:
             points = mesh.points if isinstance(mesh, Squares) else None
-            if points and points.are_squares and are_squares(self._context, points.screen.point_size):
+            if points and points.are_squares and are_squares(self._context, points.screen.point_size, points.screen.size):
                 arrays[program] = self._of_points(points, program)
             else:
                 arrays[program] = self._array(mesh, program, self._buffer(mesh, (), lambda: mesh.triangles))

@@ -13,6 +13,11 @@ from glshade.arrays import Float64
 from glshade.limits import LARGEST_MEASURED_TEXT
 from glshade.measured.formats import MeasuredFile
 
+# The longest line [bytes]: its words take about 30 times as much memory. A sample of 2000 wavelengths takes 40 kB.
+LONGEST_LINE = 1 << 20
+# The samples of a file: a table of 200,000 takes 25 s and 500 MB to make.
+MOST_SAMPLES = 200_000
+
 
 def text_lines(file: MeasuredFile) -> Iterator[tuple[int, str]]:
     """Yields (number of the line, text without blanks around it) of the lines that are not empty. Errors: AssetError."""
@@ -26,6 +31,8 @@ def text_lines(file: MeasuredFile) -> Iterator[tuple[int, str]]:
         end = file.data.find(b"\n", start)
         end = len(file.data) if end < 0 else end
         number += 1
+        if end - start > LONGEST_LINE:
+            raise file.fail(f"has {end - start:,} bytes, more than the {LONGEST_LINE:,} of a line that is read", number)
         line = file.data[start:end].decode("utf-8", "replace").strip()
         start = end + 1
         if line:
@@ -60,6 +67,8 @@ class Rows:
         for index in range(len(found)):
             if (len(self._values) + index) % self._width == 0:
                 self._lines.append(line)
+        if len(self._lines) > MOST_SAMPLES:
+            raise self._file.fail(f"holds more than {MOST_SAMPLES:,} samples, the most of which a table is made", line)
         self._values.extend(found)
         self._last = line
 

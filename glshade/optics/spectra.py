@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 import math
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -13,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, ValidationInfo, WithJsonSchema
 
-from glshade.document import Document, Finite, fault, nearest, number, received, resolved, value_of
+from glshade.document import LONGEST_NAME, Document, Finite, fault, nearest, number, received, resolved, value_of
 from glshade.errors import AssetError, figure
 from glshade.files import read_text
+from glshade.limits import LARGEST_NUMBER, SMALLEST_NUMBER
 from glshade.optics.observer import WAVELENGTHS, daylight, matching, rgb_weights, sampled, table
 
 Array = NDArray[np.float64]
@@ -35,6 +37,9 @@ INVISIBLE = 1e-3
 DIGITS = 12
 # The temperatures of blackbodies [K]: at 500 K a body begins to glow, and the colour no longer changes far above 1e5 K.
 COLDEST, HOTTEST = 500.0, 1e6
+
+# The keys of which a spectrum has one.
+SOURCES = ("spectrum", "blackbody")
 
 Rows = tuple[tuple[float, float], ...]
 
@@ -91,9 +96,13 @@ def fault_in(rows: Sequence[tuple[float, float]], place: Callable[[int], str]) -
             return f"{place(index)}: wavelengths must ascend from above 0, and {wavelength:g} nm follows {before:g} nm"
         if value < 0:
             return f"{place(index)}: the value at {wavelength:g} nm is negative"
+        if value > LARGEST_NUMBER:
+            return f"{place(index)}: the value at {wavelength:g} nm is larger than {LARGEST_NUMBER:g}"
         before = wavelength
     if before < WAVELENGTHS[0]:
         return f"ends at {before:g}, before {WAVELENGTHS[0]:g} nm: wavelengths are in nanometres"
+    if 0 < max(value for _, value in rows) < SMALLEST_NUMBER:
+        return f"has no value of at least {SMALLEST_NUMBER:g}"
     return None
 
 
@@ -174,10 +183,11 @@ class Spectrum(Document):
 
     @classmethod
     def cross_faults(cls, data: Any) -> Any:
-        given = [key for key in ("spectrum", "blackbody") if value_of(data, key) is not None]
+        given = [key for key in SOURCES if value_of(data, key) is not None]
         if len(given) == 2:
             yield ("blackbody",), "cannot be used together with spectrum, since both say how light is spread"
-        elif not given and value_of(data, "scale") is not None:
+        elif not given and not (isinstance(data, Mapping) and set(data) - set(cls.model_fields)):
+            # Another message names a misspelt key, and none is needed beside it.
             yield ("spectrum",), "is required"
 
     @property
@@ -242,8 +252,16 @@ class Spectrum(Document):
 
 
 def is_spectrum(value: Any) -> bool:
-    """Returns whether a value of the scene file is meant as a spectrum: a table with one of the keys that only spectra have."""
-    return isinstance(value, Spectrum) or (isinstance(value, Mapping) and ("spectrum" in value or "blackbody" in value))
+    """Returns whether a value of the scene file is meant as a spectrum: a table with a key that only spectra have, also where
+    that key is misspelt.
+    """
+    if not isinstance(value, Mapping):
+        return isinstance(value, Spectrum)
+    if any(key in value for key in SOURCES):
+        return True
+    # The misspelt key is then named in the message of the error.
+    words = [key.lower() for key in value if isinstance(key, str) and len(key) <= LONGEST_NAME]
+    return "texture" not in value and any(difflib.get_close_matches(word, SOURCES, n=1) for word in words)
 
 
 def colour_of(spectrum: Array) -> tuple[float, float, float]:

@@ -140,7 +140,11 @@ def _combinations(scene: Scene, wanted: tuple[str, ...]) -> Iterator[Setting]:
         if shading == "gouraud":
             ways += [{"shading": shading, "refine": value} for value in options("refine", *REFINEMENTS)[1:]]
     stores: tuple[str, ...] = ("rgba16f", "rgb10_a2", "r11f_g11f_b10f", "rgba8")
-    blends = any(instance.material.alpha_mode == "blend" for instance in assemble(scene).instances)
+    instances = assemble(scene).instances
+    if any(instance.has_bands for instance in instances):
+        # The other formats have no negative numbers.
+        stores = ("rgba16f",)
+    blends = any(instance.material.alpha_mode == "blend" for instance in instances)
     if blends or len(scene.film.background) == 4 or any(light.is_negative for light in scene.lights or ()):
         # This format has no alpha and no negative numbers.
         stores = tuple(name for name in stores if name != "r11f_g11f_b10f")

@@ -192,6 +192,7 @@ SCENES: dict[str, Scene] = {
     "ggx anisotropic": of_model("ggx", roughness=0.5, anisotropy=0.8),
     "lafortune": of_model("lafortune"),
     "lambert": ball(LAMBERT),
+    "measured": of_model("measured"),
     "metal": ball(METAL),
     "metal schlick": ball({**METAL, "fresnel": "schlick"}),
     "minnaert": of_model("minnaert", k=1.4),
@@ -298,6 +299,9 @@ SABOTAGES: tuple[Sabotage, ...] = (
     Sabotage("lafortune: norm", "lafortune", "(0.5 * p + 1.0)", "(0.5 * p + 1.01)"),
     Sabotage("lambert: 1/pi", "lambert", "0.318309886183790672", "0.318469041"),
     Sabotage("lambert: light below 0.6 degrees is dropped", "lambert", "NoL > 0.0 &&", "NoL > 0.01 &&"),
+    Sabotage("measured: theta_h is not a root", "measured", "vec3(sqrt(theta_h), theta_d", "vec3(theta_h, theta_d"),
+    Sabotage("measured: theta_d 1 % too large", "measured", "right_angles(0.5 * length(q)", "right_angles(0.505 * length(q)"),
+    Sabotage("measured: binary logarithm", "measured", "exp2(textureLod(", "exp(textureLod("),
     Sabotage(
         "metal: extinction in F", "metal", "lessThan(eta, vec3(0.5))) - k * k", "lessThan(eta, vec3(0.5))) - 1.001 * k * k"
     ),

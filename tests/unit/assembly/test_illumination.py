@@ -154,6 +154,11 @@ def test_a_film_with_a_white_of_its_own_shows_that_light_as_white() -> None:
     assert blue > 1.5 * red
 
 
+def test_the_white_of_daylight_changes_nothing() -> None:
+    colours = ({"kd": (0.8, 0.3, 0.1)}, (1, 0.5, 0.2))
+    np.testing.assert_allclose(shown(scene(*colours, white="D65")), shown(scene(*colours)), rtol=1e-9)
+
+
 def test_the_light_of_an_invisible_lamp_shows_only_by_reradiation(tmp_path: Path) -> None:
     dye = write_dye(tmp_path)
     lamp = {"spectrum": LAMP}

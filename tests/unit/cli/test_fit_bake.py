@@ -65,6 +65,7 @@ def test_fit_keeps_parameters_and_options_that_are_given(baked: Path) -> None:
         (("--model", "ward", "--start", "alfa=1"), "ward has no 'alfa'"),
         (("--model", "ward", "-p", "alpha_x=7"), "must be at most 1"),
         (("--model", "lambert", "-p", "kd=0.5"), "no parameter that is free"),
+        (("--model", "measured"), "measured is no formula"),
     ],
 )
 def test_fit_refuses_what_it_cannot_do(baked: Path, words: tuple[str, ...], message: str) -> None:
@@ -106,3 +107,20 @@ def test_plot_draws_a_file_beside_its_fit(baked: Path, tmp_path: Path) -> None:
     output = tmp_path / "a.svg"
     assert run("plot", str(baked), "--fit", "ward", "-o", str(output)).output == f"{output}\n"
     assert "<svg" in output.read_text(encoding="utf-8")
+
+
+def test_plot_refuses_what_it_cannot_draw_beside_a_file(baked: Path, tmp_path: Path) -> None:
+    output = tmp_path / "a.svg"
+    for words, message in (
+        (("ward",), "is plotted alone"),
+        (("--bare",), "--bare has no effect"),
+        (("-k", "albedo", "--angles", "20"), "--kind has no effect"),
+        (("--fit", "measured"), "no model that can be fitted is named 'measured'"),
+        (("--fit", "wrad"), 'did you mean "ward"'),
+    ):
+        result = CliRunner().invoke(cli, ("plot", str(baked), *words, "-o", str(output)))
+        assert result.exit_code == 2
+        assert message in result.output
+    with pytest.raises(AssetError, match="there is no such file"):
+        run("plot", str(tmp_path / "missing.brdf"), "-o", str(output))
+    assert not output.exists()

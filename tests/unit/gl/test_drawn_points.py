@@ -107,3 +107,12 @@ def test_blended_points_are_sorted_as_triangles(renderer: Any) -> None:
     with pytest.warns(ApproximateWarning):
         _, are_points, _ = drawn(renderer, blended)
     assert not are_points
+
+
+def test_a_picture_as_wide_as_the_driver_allows(renderer: Renderer) -> None:
+    """A viewport cannot be larger than that, so that the points are drawn as triangles."""
+    side = renderer.context.largest_side
+    wide = scene(cloud(), size=(side, 3), point_size=3)
+    whole = renderer.render(wide, tile=side).pixels.copy()
+    assert whole.any()
+    np.testing.assert_array_equal(whole, renderer.render(wide, tile=side // 2).pixels)

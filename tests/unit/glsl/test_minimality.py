@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -19,6 +19,7 @@ from support.uber import EverythingRenderer
 from glshade import BRDFS, LIGHTS, Image, Mesh, Renderer, Scene, explain, load
 from glshade.assembly.assembly import Assembly, assemble
 from glshade.assembly.instance import Instance
+from glshade.gl.preparation import DrawCall, Prepared
 from glshade.glsl.definitions import uncommented
 from glshade.glsl.generator import generate
 from glshade.glsl.plan import ProgramPlan
@@ -268,8 +269,14 @@ class Mutilated(Renderer):
         pixels: NDArray[np.float32] = self.render(scene, dtype="float32").pixels.copy()
         return pixels
 
-    def _set_state(self, blended: bool, added: bool, culled: bool, mirrored: bool) -> None:
-        super()._set_state(blended, added, culled or self.culled, mirrored)
+    def draw(self, prepared: Prepared, clip: NDArray[np.float32], calls: Iterable[DrawCall] | None = None) -> None:
+        chosen = prepared.calls if calls is None else calls
+        super().draw(prepared, clip, map(without_backs, chosen) if self.culled else chosen)
+
+
+def without_backs(call: DrawCall) -> DrawCall:
+    """Returns the draw call with back faces culled."""
+    return replace(call, instances=tuple(replace(instance, back_faces=False) for instance in call.instances))
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import struct
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -235,6 +236,38 @@ def test_bad_files_are_refused_in_one_line(name: str, tmp_path: Path) -> None:
     assert message.startswith(str(path))
     assert words in message
     assert "\n" not in message
+
+
+def test_a_long_line_is_refused_before_it_is_taken_apart(tmp_path: Path) -> None:
+    path = tmp_path / "long.alta"
+    path.write_text("#DIM 1 1\n#PARAM_IN COS_TH\n#PARAM_OUT INV_STERADIAN\n" + "0.5 " * 300_000, encoding="utf-8")
+    with pytest.raises(AssetError, match=r"long.alta:4: has 1,200,000 bytes, more than the 1,048,576 of a line"):
+        read(path)
+
+
+@pytest.mark.parametrize(("name", "text"), [("many.alta", ALTA), ("many.brdf", CORNELL)])
+def test_more_samples_than_a_table_can_be_made_of_are_refused(
+    name: str, text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / name
+    path.write_text(text, encoding="utf-8")
+    monkeypatch.setattr("glshade.measured.number_lines.MOST_SAMPLES", 2)
+    assert len(read(path).f) == 2
+    monkeypatch.setattr("glshade.measured.number_lines.MOST_SAMPLES", 1)
+    with pytest.raises(AssetError, match=rf"{name}:\d+: holds more than 1 samples"):
+        read(path)
+
+
+def test_a_file_as_large_as_those_of_merl_takes_little_memory_beside_its_values() -> None:
+    """The values take 35 MB as float64, and so does the file itself."""
+    data = binary.MERL_HEADER + bytes(8 * 3 * 90 * 90 * 180)
+    tracemalloc.start()
+    try:
+        with pytest.raises(AssetError, match="holds no light"):
+            read(Path("black.binary"), data)
+        assert tracemalloc.get_traced_memory()[1] < 60e6
+    finally:
+        tracemalloc.stop()
 
 
 def test_a_missing_file_and_a_folder_are_refused(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
 
+from glshade.brdfs import BRDFS
 from glshade.errors import AssetError
 from glshade.optics.observer import WAVELENGTHS, daylight, matching, reflected, rgb_weights, sampled, weights_for
 from glshade.optics.spectra import ILLUMINANTS, Spectrum, rows_of
@@ -126,6 +127,29 @@ def test_faults_are_told_in_one_line() -> None:
     assert fault_of(spectrum=5) == "must be a name, a file, or a list of pairs [nm, value], not 5"
     assert "from 500 to 1e+06" in fault_of(blackbody=20)
     assert "together" in fault_of(blackbody=3000, spectrum="A")
+    assert "larger than 1e+100" in fault_of(spectrum=[[400, 1], [500, 1e101]])
+    assert "at least 1e-100" in fault_of(spectrum=[[400, 1e-310], [500, 1e-310]])
+
+
+@pytest.mark.parametrize("keys", [{}, {"spectrum": None}, {"blackbody": None}, {"scale": 2}])
+def test_a_spectrum_without_values_is_a_fault(keys: dict[str, Any]) -> None:
+    assert fault_of(**keys) == "is required"
+
+
+@settings(max_examples=20)
+@given(st.lists(st.floats(1e-100, 1e100), min_size=3, max_size=3))
+def test_tables_in_any_unit_are_lights_without_overflow(values: list[float]) -> None:
+    power = spectrum(spectrum=list(zip((400, 550, 700), values, strict=True))).light()
+    assert np.isfinite(power).all()
+    assert power.max() > 0
+
+
+@pytest.mark.parametrize("key", ["spectru", "Spectrum", "black_body"])
+def test_a_misspelt_spectrum_is_named(key: str) -> None:
+    with pytest.raises(ValidationError) as caught:
+        BRDFS["lambert"].model_validate({"brdf": "lambert", "kd": {key: 3000}})
+    assert {error["loc"][0] for error in caught.value.errors()} == {"kd"}
+    assert not any("texture" in error["loc"] for error in caught.value.errors())
 
 
 TABLE = "# made up\nwavelength,value\n400,0.1\n500;0.2\n600 0.3\n"

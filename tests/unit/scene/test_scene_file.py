@@ -111,6 +111,11 @@ def test_every_fault_has_its_file_and_key_path(kind: str, tmp_path: Path) -> Non
         ("e.json", '{"objects": [{"shape": "cube"}], "film": {"exposure": NaN}}', "film.exposure: nan is not a finite number"),
         ("e.json", '{"objects": [{"shape": "cube"}], "film": {"exposure": 1e999}}', "film.exposure: inf is not a finite"),
         ("e.json", '{"objects": [{"shape": "cube"}], "film": {"size": [1e999, 1]}}', "film.size[0]: "),
+        (
+            "e.json",
+            '{"objects": [{"shape": "cube", "material": {"brdf": "measured", "file": 3}}]}',
+            "objects[0].material.file: must be the path of a file, not 3",
+        ),
         ("e.xml", "<a/>", ".xml is neither a scene nor a mesh; known: .toml, .json, "),
         ("scene", "", "no extension is neither a scene nor a mesh"),
     ],

@@ -226,6 +226,10 @@ class TestErrors:
             update={"lights": (glshade.LIGHTS["ambient"].model_validate({"type": "ambient", "intensity": -1}),)}
         )
         assert "r11f_g11f_b10f" not in {s.storage for s in space(dark, ("storage",))[0]}
+        # Bands of wavelengths have negative weights.
+        metal = {"brdf": "metal", "eta": {"spectrum": [[400, 1.5], [700, 0.2]]}}
+        banded = Scene.model_validate({"objects": [{"shape": "sphere", "material": metal}], "film": {"size": (8, 8)}})
+        assert {s.storage for s in space(banded, ("storage",))[0]} == {"rgba32f", "rgba16f"}
 
 
 class TestSpace:
