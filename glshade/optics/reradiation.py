@@ -9,11 +9,12 @@ from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import AfterValidator, Field, ValidationInfo
+from pydantic import AfterValidator, Field, ValidationInfo, model_validator
 
 from glshade.document import Document, Finite, fault, resolved
 from glshade.errors import AssetError
 from glshade.files import read_text
+from glshade.optics.bispectral import read_pixel
 from glshade.optics.observer import WAVELENGTHS
 
 Array = NDArray[np.float64]
@@ -40,16 +41,28 @@ class Reradiation(Document):
 
     file: Annotated[Path, AfterValidator(_readable)] = Field(
         description="CSV: the first row holds the wavelengths of emission [nm], the first column those of excitation [nm], and "
-        "the rest the yield, the share of the absorbed and reflected light that is given off [1/nm]"
+        "the rest the yield, the share of the absorbed and reflected light that is given off [1/nm]; or a bispectral EXR file"
+    )
+    pixel: tuple[Annotated[int, Field(ge=0)], Annotated[int, Field(ge=0)]] = Field(
+        (0, 0), description="column and row of the pixel of an EXR file, from the upper left corner"
     )
     scale: Annotated[Finite, Field(ge=0)] = Field(1.0, description="multiplies the yield")
+
+    @model_validator(mode="after")
+    def _has_pixel(self) -> Reradiation:
+        if self.pixel != (0, 0):
+            try:
+                matrix_of(self.file, self.pixel)
+            except AssetError as error:
+                raise fault("; ".join(error.problems)) from None
+        return self
 
     def matrix(self) -> Array:
         """Returns the yield (531, 531) [1/nm]: a row for each exciting wavelength, a column for each emitted one.
 
         It is linear between the wavelengths of the table, and 0 beyond them. Errors: AssetError.
         """
-        excitation, emission, values = matrix_of(self.file)
+        excitation, emission, values = matrix_of(self.file, self.pixel)
         columns = np.stack([np.interp(WAVELENGTHS, emission, row, 0.0, 0.0) for row in values])
         return self.scale * np.stack([np.interp(WAVELENGTHS, excitation, column, 0.0, 0.0) for column in columns.T], axis=1)
 
@@ -70,28 +83,52 @@ class Reradiation(Document):
         """Returns the exciting wavelength and the emitted one [nm] of the largest yield of waves that are shorter than those
         which excited them; None if there are none. Errors: AssetError.
         """
-        excitation, emission, values = matrix_of(self.file)
+        excitation, emission, values = matrix_of(self.file, self.pixel)
         wrong = np.where(emission < excitation[:, None], values, 0.0)
         row, column = np.unravel_index(int(np.argmax(wrong)), wrong.shape)
         return (float(excitation[row]), float(emission[column])) if wrong[row, column] > 0 else None
 
 
-def matrix_of(path: Path) -> tuple[Array, Array, Array]:
-    """Returns the exciting wavelengths (N,) [nm], the emitted ones (M,) [nm], and the yield (N, M) [1/nm] of a CSV file.
+def matrix_of(path: Path, pixel: tuple[int, int] = (0, 0)) -> tuple[Array, Array, Array]:
+    """Returns the exciting wavelengths (N,) [nm], the emitted ones (M,) [nm], and the yield (N, M) [1/nm] of a file.
 
-    Numbers are separated by commas or semicolons; the first cell may hold any text; lines that start with # are comments.
+    In a CSV file, numbers are separated by commas or semicolons; the first cell may hold any text; lines that start with # are
+    comments.
+    pixel: column and row of the pixel of an EXR file.
     Errors: AssetError, in one line.
     """
     try:
         found = path.stat()
     except OSError as error:
         raise AssetError(f"{path}: cannot be read: {error.strerror}") from None
-    return _matrix_of(path, found.st_mtime_ns, found.st_size)
+    return _matrix_of(path, pixel, found.st_mtime_ns, found.st_size)
 
 
 @lru_cache(maxsize=64)
-def _matrix_of(path: Path, changed: int, size: int) -> tuple[Array, Array, Array]:
+def _matrix_of(path: Path, pixel: tuple[int, int], changed: int, size: int) -> tuple[Array, Array, Array]:
     """Returns the table of a file, from the cache unless it has changed. changed, size: its time and size."""
+    if path.suffix.lower() == ".exr":
+        excitation, emission, values = read_pixel(path, pixel)
+    elif pixel != (0, 0):
+        raise AssetError(f"{path}: has no pixels; only an EXR file has")
+    else:
+        excitation, emission, values = _read_csv(path)
+    for name, wavelengths in (("emission", emission), ("excitation", excitation)):
+        if not np.isfinite(wavelengths).all() or wavelengths[0] <= 0 or not (np.diff(wavelengths) > 0).all():
+            raise AssetError(f"{path}: the wavelengths of {name} must ascend from above 0")
+        if wavelengths[-1] < WAVELENGTHS[0]:
+            raise AssetError(f"{path}: the wavelengths of {name} end before {WAVELENGTHS[0]:g} nm: they are in nanometres")
+    bad = np.argwhere(~(np.isfinite(values) & (values >= 0)))
+    if len(bad):
+        row, column = bad[0]
+        raise AssetError(
+            f"{path}: the yield from {excitation[row]:g} nm to {emission[column]:g} nm is negative or not a finite number"
+        )
+    return excitation, emission, values
+
+
+def _read_csv(path: Path) -> tuple[Array, Array, Array]:
+    """Returns the table of a CSV file, as `matrix_of` does, without having looked at its numbers. Errors: AssetError."""
     rows: list[list[float]] = []
     for line, text in enumerate(read_text(path, LARGEST_MATRIX, AssetError).splitlines(), 1):
         if not text.strip() or text.lstrip().startswith("#"):
@@ -108,16 +145,4 @@ def _matrix_of(path: Path, changed: int, size: int) -> tuple[Array, Array, Array
     if len(rows) < 3 or len(rows[0]) < 2:
         raise AssetError(f"{path}: a matrix needs at least two wavelengths of excitation and two of emission")
     table = np.array(rows[1:])
-    excitation, emission, values = table[:, 0], np.array(rows[0]), table[:, 1:]
-    for name, wavelengths in (("emission", emission), ("excitation", excitation)):
-        if not np.isfinite(wavelengths).all() or wavelengths[0] <= 0 or not (np.diff(wavelengths) > 0).all():
-            raise AssetError(f"{path}: the wavelengths of {name} must ascend from above 0")
-        if wavelengths[-1] < WAVELENGTHS[0]:
-            raise AssetError(f"{path}: the wavelengths of {name} end before {WAVELENGTHS[0]:g} nm: they are in nanometres")
-    bad = np.argwhere(~(np.isfinite(values) & (values >= 0)))
-    if len(bad):
-        row, column = bad[0]
-        raise AssetError(
-            f"{path}: the yield from {excitation[row]:g} nm to {emission[column]:g} nm is negative or not a finite number"
-        )
-    return excitation, emission, values
+    return table[:, 0], np.array(rows[0]), table[:, 1:]

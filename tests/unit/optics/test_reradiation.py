@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from glshade.errors import AssetError
+from glshade.image.image import Image
 from glshade.optics.observer import WAVELENGTHS, daylight
 from glshade.optics.reradiation import Reradiation, matrix_of
 
@@ -21,6 +24,20 @@ def write(path: Path, values: Any, corner: str = "ex \\ em") -> Path:
     rows = [",".join([corner, *map(str, EMISSION)])]
     rows += [",".join([str(x), *(repr(float(v)) for v in row)]) for x, row in zip(EXCITATION, values, strict=True)]
     path.write_text("# a dye\n" + "\n".join(rows) + "\n", encoding="utf-8")
+    return path
+
+
+def write_exr(path: Path, factors: Any) -> Path:
+    """Writes a bispectral EXR file of radiance factors (height, width, 3, 4), beside reflectances that are not to be read."""
+    height, width = np.shape(factors)[:2]
+    pairs = [(f"T.{x},000000nm.{y},000000nm", i, k) for i, x in enumerate(EXCITATION) for k, y in enumerate(EMISSION)]
+    spec = oiio.ImageSpec(width, height, len(pairs) + 1, oiio.FLOAT)
+    spec.channelnames = ("T.430,000000nm", *(name for name, _, _ in pairs))
+    planes = [np.full((height, width), 0.7), *(np.asarray(factors)[:, :, i, k] for _, i, k in pairs)]
+    output = oiio.ImageOutput.create(str(path))
+    assert output.open(str(path), spec)
+    assert output.write_image(np.stack(planes, axis=2).astype(np.float32))
+    output.close()
     return path
 
 
@@ -48,6 +65,43 @@ def test_emission_is_matrix_times_light(tmp_path: Path) -> None:
         by_hand += power * row
     np.testing.assert_allclose(found.emitted(daylight()), by_hand, rtol=1e-12)
     assert by_hand.any()
+
+
+def test_a_pixel_of_a_bispectral_file_is_read(tmp_path: Path) -> None:
+    factors = np.random.default_rng(1).uniform(0, 0.1, (2, 3, 3, 4))
+    path = write_exr(tmp_path / "dyes.exr", factors)
+    for pixel in ((0, 0), (2, 1)):
+        excitation, emission, values = matrix_of(path, pixel)
+        assert (excitation.tolist(), emission.tolist()) == (EXCITATION, EMISSION)
+        # The bands are 20 nm wide.
+        np.testing.assert_allclose(values, factors[pixel[1], pixel[0]] / 20, rtol=1e-6)
+    read = Reradiation.model_validate({"file": path, "pixel": (2, 1), "scale": 0.5})
+    np.testing.assert_allclose(read.matrix(), 0.5 * dye(tmp_path, factors[1, 2] / 20).matrix(), rtol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("pixel", "suffix", "says"),
+    [((3, 0), "exr", "has 3 x 2 pixels, and none at [3, 0]"), ((0, 2), "exr", "none at [0, 2]"), ((1, 0), "csv", "no pixels")],
+)
+def test_a_pixel_that_is_not_there_is_refused(pixel: Any, suffix: str, says: str, tmp_path: Path) -> None:
+    path = write_exr(tmp_path / "a.exr", np.zeros((2, 3, 3, 4)))
+    path = path if suffix == "exr" else write(tmp_path / "a.csv", np.zeros((3, 4)))
+    with pytest.raises(ValueError, match=re.escape(says)):
+        Reradiation.model_validate({"file": path, "pixel": pixel})
+
+
+def test_other_exr_files_are_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "rgb.exr"
+    Image(np.zeros((2, 2, 3), np.float32)).save(path)
+    with pytest.raises(AssetError, match="has no bispectral channels such as"):
+        matrix_of(path)
+    path.write_bytes(path.read_bytes()[:60])
+    with pytest.raises(AssetError, match="cannot be read as an EXR file"):
+        matrix_of(path)
+    whole = write_exr(tmp_path / "whole.exr", np.random.default_rng(2).uniform(0, 1, (2, 3, 3, 4))).read_bytes()
+    path.write_bytes(whole[:-40])
+    with pytest.raises(AssetError, match="cannot be read"):
+        matrix_of(path)
 
 
 @settings(max_examples=25)
