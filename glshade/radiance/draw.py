@@ -182,6 +182,12 @@ class Draw:
         maps = [sampler for sampler in (self.normal_map, self.directions) if sampler is not None]
         return [*self.samplers.values(), *maps]
 
+    @property
+    def grids(self) -> tuple[tuple[Any, ...] | None, ...]:
+        """The different `Sampler.grid` of the textures; just None where all textures have the same one."""
+        found = {sampler.grid for part in (self, *self.shares) for sampler in part.pictures}
+        return tuple(sorted(found, key=str)) if len(found) > 1 else (None,)
+
     @cached_property
     def clip(self) -> Array:
         """The positions of the vertices in clip space (V, 4)."""

@@ -126,6 +126,11 @@ class Sampler:
         result: NDArray[np.float64] = np.array([self.widths[0], self.heights[0]]) / np.array(self.span)
         return result
 
+    @property
+    def grid(self) -> tuple[Any, ...]:
+        """All that decides the level of detail at given changes of a mesh's texture coordinates."""
+        return (*self.size.tolist(), None if self.placement is None else self.placement.tobytes())
+
     def level(self, dx: Array, dy: Array, rule: Rule = "length") -> Array:
         """Returns the level of detail (N,) of pixels.
 

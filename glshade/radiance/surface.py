@@ -37,6 +37,7 @@ class Surface:
     colour: vertex colours, linear Rec. 709, and alpha (N, 4); None where they are not used.
     footprint: changes of uv from a pixel to the next one in its row and in its column, (N, 2) each; None in the vertex stage.
     level: number, or array (N,), that is added to the textures' level of detail.
+    grid: the `Sampler.grid` of the textures to whose level of detail it is added; None for all textures.
     member: the index (N,) of each point's draw in a joined draw; None for the points of a single draw.
     """
 
@@ -48,7 +49,14 @@ class Surface:
     colour: Array | None
     footprint: tuple[Array, Array] | None = None
     level: Any = 0.0
+    grid: tuple[Any, ...] | None = None
     member: NDArray[np.intp] | None = None
+
+    def level_of(self, sampler: Sampler) -> Array:
+        """Returns the level of detail (N,) of a texture at the points of a fragment stage."""
+        assert self.footprint is not None
+        level = sampler.level(*self.footprint)
+        return level + self.level if self.grid is None or self.grid == sampler.grid else level
 
 
 def mapped(surface: Surface, function: Callable[[Array], Array]) -> Surface:
@@ -73,7 +81,7 @@ def part_of(surface: Surface, which: slice | NDArray[np.intp]) -> Surface:
 
 
 def joined(surfaces: Sequence[Surface]) -> Surface:
-    """Returns the points of several surfaces, which have the same attributes, as one surface."""
+    """Returns the points of several surfaces, which have the same attributes and the same `grid`, as one surface."""
 
     def join(values: list[Any]) -> Any:
         if isinstance(values[0], tuple):
@@ -82,8 +90,9 @@ def joined(surfaces: Sequence[Surface]) -> Surface:
 
     counts = [len(surface.position) for surface in surfaces]
     levels = [np.broadcast_to(surface.level, count) for surface, count in zip(surfaces, counts, strict=True)]
-    named = {name: join([getattr(surface, name) for surface in surfaces]) for name in vars(surfaces[0]) if name != "level"}
-    return Surface(**named, level=np.concatenate(levels))
+    rows = [name for name in vars(surfaces[0]) if name not in ("level", "grid")]
+    named = {name: join([getattr(surface, name) for surface in surfaces]) for name in rows}
+    return Surface(**named, level=np.concatenate(levels), grid=surfaces[0].grid)
 
 
 def at_vertices(draw: Draw, which: NDArray[np.intp], dtype: Any, centroids: bool = False) -> Surface:
@@ -149,7 +158,7 @@ def _sampled(sampler: Sampler, surface: Surface) -> Array:
         raise ValueError("a texture needs texture coordinates")
     if surface.footprint is None:
         return sampler.sample(sampler.coordinates(surface.uv))
-    return sampler.sample(sampler.coordinates(surface.uv), sampler.level(*surface.footprint) + surface.level)
+    return sampler.sample(sampler.coordinates(surface.uv), surface.level_of(sampler))
 
 
 def alpha_of(draw: Draw, surface: Surface) -> Array:

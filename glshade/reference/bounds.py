@@ -594,10 +594,12 @@ def _spread(
     level = np.zeros_like(value)
     if errors.level is not None:
         offsets = _spaced(*errors.level, LEVELS)
-        values = _evaluated(draw, evaluate, (replace(surface, level=offset) for offset in offsets))
-        margin = _between(values)
-        widen(values, margin)
-        level = np.maximum.reduce([np.abs(other - value) for other in values]) + margin
+        # Textures of different sizes have different errors of their levels.
+        for of_textures in draw.grids:
+            values = _evaluated(draw, evaluate, (replace(surface, level=offset, grid=of_textures) for offset in offsets))
+            margin = _between(values)
+            widen(values, margin)
+            level += np.maximum.reduce([np.abs(other - value) for other in values]) + margin
     return {
         "value": value,
         "below": below,

@@ -282,7 +282,7 @@ class _Picture:
         lanes = len(self.surface.position)
         uv = np.broadcast_to(at, (2, lanes)).T * np.array(self.sampler.span)
         if level is None and self.surface.footprint is not None:
-            level = self.sampler.level(*self.surface.footprint) + self.surface.level + bias
+            level = self.surface.level_of(self.sampler) + bias
         return np.asarray(self.sampler.sample(uv, None if level is None else np.broadcast_to(level, lanes)).T)
 
     def fetch(self, at: Array, level: Array) -> Array:

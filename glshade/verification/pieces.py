@@ -103,9 +103,8 @@ def _visible(inputs: Inputs, driver: Freedom) -> tuple[Pieces, Pieces]:
         # Fragments in front of the near plane or behind the far plane are not drawn. If a fragment may be on either side of a
         # plane, a driver may draw it or not.
         inside = (z.nearest >= 0) & (z.farthest <= 1)
-        clipped = (z.farthest <= 0) | (z.nearest >= 1)
         possible = inside & (z.nearest >= hidden[part.pixel])
-        part = replace(part, partial=part.partial | clipped).take(possible)
+        part = replace(part, partial=part.partial | _crosses(z)).take(possible)
         z = z.take(possible)
         opaque = (modes[part.draw] == "opaque") & ~part.partial
         np.maximum.at(hidden, part.pixel[opaque], z.farthest[opaque])
@@ -142,6 +141,8 @@ def _settled(inputs: Inputs, fragments: Fragments, z: Depths, driver: Freedom) -
         kept = np.ones(len(fragments), dtype=np.bool_)
         kept[masked] = high >= limit
         fragments, z, uncertain = fragments.take(kept), z.take(kept), uncertain[kept]
+    # The near or the far plane may cut a triangle within the pixel, where no neighbour covers what it leaves out.
+    uncertain |= _crosses(z)
     partial = fragments.partial | uncertain
     sheet = np.full(len(fragments), -1)
     which = np.flatnonzero(fragments.partial & ~uncertain)
@@ -159,6 +160,12 @@ def _settled(inputs: Inputs, fragments: Fragments, z: Depths, driver: Freedom) -
         np.concatenate([partial, partial[turned]]),
         np.concatenate([sheet, sheet[turned]]),
     )
+
+
+def _crosses(z: Depths) -> Flags:
+    """Returns whether each fragment (N,) may be on either side of the near or the far plane."""
+    crosses: Flags = (z.farthest <= 0) | (z.nearest >= 1)
+    return crosses
 
 
 def _behind(pieces: Pieces, inputs: Inputs) -> Flags:
