@@ -19,7 +19,8 @@ from glshade.verification.mutations import MUTATIONS, Mutation
 from glshade.verification.trials import VISIBLE
 
 # Scenes in which, together, every mutation shows, and the width of their pictures [pixels].
-SCENES, WIDTH = ("simple-model", "falloff", "detail", "anisotropy", "perspective-viewer", "emission", "measured"), 160
+SCENES = ("simple-model", "falloff", "detail", "anisotropy", "perspective-viewer", "emission", "measured", "spectral-metals")
+WIDTH = 160
 # The share of the visible faults whose cause must be named.
 NAMED = 0.9
 
