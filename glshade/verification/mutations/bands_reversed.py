@@ -6,4 +6,6 @@ MUTATION = Mutation(
     name="bands-reversed",
     description="of each three bands of a spectrum, the first counts as the last",
     edits=((r"u_rgb_from_bands \* \(c\);", r"u_rgb_from_bands * c.bgr;"),),
+    # Each lamp has another colour on each material.
+    causes=("light",),
 )

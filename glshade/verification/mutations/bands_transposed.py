@@ -6,4 +6,6 @@ MUTATION = Mutation(
     name="bands-transposed",
     description="the matrix that turns bands of a spectrum into RGB is transposed",
     edits=((r"u_rgb_from_bands \* \(c\);", r"c * u_rgb_from_bands;"),),
+    # Each lamp has another colour on each material.
+    causes=("light",),
 )
