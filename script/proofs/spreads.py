@@ -16,6 +16,7 @@ from glshade.gl.context import Context, open_context
 from glshade.gl.evaluation import run_on_gpu
 from glshade.glsl.generator import value_code
 from glshade.glsl.shaders import current
+from glshade.glsl.uniforms import model_inputs
 from glshade.spirv.arithmetic import FLOAT64, RandomRounding
 from glshade.spirv.model import model_text
 from glshade.spirv.ranges import directions, parameters, variants
@@ -65,5 +66,6 @@ def _ratios(context: Context, variant: Brdf, random: np.random.Generator) -> np.
     spread = np.maximum.reduce([np.abs(run - exact) for run in runs])
     spread = np.maximum(spread, np.maximum(LEAST, LEAST_RELATIVE * np.abs(exact)))
     code, files = value_code(variant), current()
-    errors = [np.abs(run_on_gpu(context, stage, code, values, l, v, files) - exact) for stage in ("vertex", "fragment")]
+    given = {**model_inputs(variant), **values}
+    errors = [np.abs(run_on_gpu(context, stage, code, given, l, v, files) - exact) for stage in ("vertex", "fragment")]
     return np.concatenate([(error / spread).ravel() for error in errors])
