@@ -217,7 +217,7 @@ class Illumination:
         exact: list[tuple[list[int], Brdf]] = []
 
         def add(lights: Sequence[int], own: Brdf) -> None:
-            """Adds lamps that show a material in these colours; lamps that show it alike go together."""
+            """Adds lamps that show the material as `own`. They join the earlier lamps that show it in the same way."""
             for known, other in exact:
                 if other == own:
                     known.extend(lights)

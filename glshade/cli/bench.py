@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +36,24 @@ def command() -> None:
     """
 
 
+def _reported(function: Callable[..., None]) -> Callable[..., None]:
+    """Adds the options of a subcommand that measures works and reports on them."""
+    options = (
+        click.option(
+            "--size", type=click.Choice(["full", "small"]), default="full", help="small: reduced works, to see that they run."
+        ),
+        click.option("--json", "as_json", is_flag=True, help="Prints the results as one JSON object."),
+        click.option("--markdown", "as_markdown", is_flag=True, help="Prints the tables of docs/benchmarks.md."),
+        click.option(
+            "--save", type=click.Path(path_type=Path, dir_okay=False), help="Also writes the JSON object to this file."
+        ),
+    )
+    # Decorators are applied from the last to the first.
+    for option in reversed(options):
+        function = option(function)
+    return function
+
+
 @command.command()
 @click.argument("names", metavar="[NAME]...", nargs=-1)
 @click.option(
@@ -47,12 +66,7 @@ def command() -> None:
     show_default=True,
     help="Number of rounds; each program runs once in each.",
 )
-@click.option(
-    "--size", type=click.Choice(["full", "small"]), default="full", help="small: reduced works, to see that they run."
-)
-@click.option("--json", "as_json", is_flag=True, help="Prints the results as one JSON object.")
-@click.option("--markdown", "as_markdown", is_flag=True, help="Prints the tables of docs/benchmarks.md.")
-@click.option("--save", type=click.Path(path_type=Path, dir_okay=False), help="Also writes the JSON object to this file.")
+@_reported
 def work(
     names: tuple[str, ...], peers: tuple[str, ...], repeat: int, size: str, as_json: bool, as_markdown: bool, save: Path | None
 ) -> None:
@@ -97,12 +111,7 @@ def work(
     show_default=True,
     help="Number of rounds; the largest works have fewer.",
 )
-@click.option(
-    "--size", type=click.Choice(["full", "small"]), default="full", help="small: reduced works, to see that they run."
-)
-@click.option("--json", "as_json", is_flag=True, help="Prints the results as one JSON object.")
-@click.option("--markdown", "as_markdown", is_flag=True, help="Prints the tables of docs/benchmarks.md.")
-@click.option("--save", type=click.Path(path_type=Path, dir_okay=False), help="Also writes the JSON object to this file.")
+@_reported
 def life(
     names: tuple[str, ...], peers: tuple[str, ...], repeat: int, size: str, as_json: bool, as_markdown: bool, save: Path | None
 ) -> None:

@@ -13,34 +13,19 @@ from numpy.typing import NDArray
 from glshade.arrays import rounded
 from glshade.assembly.strokes import CORNERS
 from glshade.gl.context import Context
+from glshade.gl.program import Program
+from glshade.glsl.shaders import expand
+from glshade.glsl.source import Source
 
 # The side of the pictures [pixels] by which a driver is tested, and the number of their points.
 TESTED, COUNT = 32, 24
-VERTEX = """\
-#version 330
-uniform mat4 u_clip_from_world;
-in vec3 a_position;
-flat out float v_shade;
-
-void main() {
-    v_shade = a_position.z;
-    gl_Position = u_clip_from_world * vec4(a_position, 1.0);
-}
-"""
-FRAGMENT = """\
-#version 330
-flat in float v_shade;
-out vec4 o_colour;
-
-void main() {
-    o_colour = vec4(v_shade);
-}
-"""
 # context -> (side, whether the driver draws points of this side as squares).
 _tested: WeakKeyDictionary[Context, dict[float, bool]] = WeakKeyDictionary()
 
 
-def draw_points(context: Context, program: Any, vertices: moderngl.VertexArray, side: float, clip: NDArray[np.float32]) -> None:
+def draw_points(
+    context: Context, program: Program, vertices: moderngl.VertexArray, side: float, clip: NDArray[np.float32]
+) -> None:
     """Draws points as squares into the bound framebuffer.
 
     OpenGL leaves out a point whose centre is outside the picture (4.6 core profile, 13.7), although half of its square may be
@@ -84,17 +69,6 @@ def are_squares(context: Context, side: float, size: tuple[int, int]) -> bool:
     return known[side]
 
 
-class _Program:
-    """The program of the test."""
-
-    def __init__(self, gl: moderngl.Context) -> None:
-        self.gl = gl.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
-
-    def write(self, name: str, value: NDArray[np.float32]) -> None:
-        """Sets a uniform matrix."""
-        self.gl[name].write(np.ascontiguousarray(value.T).tobytes())  # type: ignore[union-attr]
-
-
 def _draws_alike(context: Context, side: float, samples: int) -> bool:
     """Returns whether points of a side [pixels] and pairs of triangles give the same picture of COUNT squares."""
     gl = context.gl
@@ -106,7 +80,7 @@ def _draws_alike(context: Context, side: float, samples: int) -> bool:
     triangles = (4 * np.arange(COUNT, dtype=np.uint32)[:, None] + CORNERS).reshape(-1)
     clip = rounded(np.diag([2 / TESTED, 2 / TESTED, 0.0, 1.0]))
     clip[:2, 3] = -1
-    program = _Program(gl)
+    program = Program(context, Source(expand("driver/points.vert", {}), expand("driver/points.frag", {})))
     target = gl.framebuffer([gl.renderbuffer(size, 4, samples=samples)])
     resolved = gl.framebuffer([gl.renderbuffer(size, 4)])
     gl.enable_only(moderngl.NOTHING)

@@ -44,7 +44,7 @@ if TYPE_CHECKING:
 DType = Literal["uint8", "float32"]
 # The limits of the cache of prepared scenes: their number, and their size [bytes]. An animation alternates between few scenes.
 SCENES, SCENES_SIZE = 8, 96 << 20
-# `render_many` reads pictures back together while their frames take at most this much memory [bytes].
+# `render_many` draws pictures into frames of their own, and reads them back when the frames take this much memory [bytes].
 TOGETHER = 64 << 20
 
 

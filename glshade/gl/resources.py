@@ -86,8 +86,10 @@ class Resources:
         return self._programs, self._textures, self._frames
 
     def texture(self, texels: Texels | Volume) -> moderngl.Texture | moderngl.Texture3D:
-        """Returns the texture of a picture or of a table. A picture is loaded again if the file has changed, and evicted
-        together with a picture in memory. Errors: AssetError, SceneError.
+        """Returns the texture of a picture or of a table, from the cache if possible.
+
+        The texture of a file is made again if the file has changed. That of an array is evicted when the array is freed.
+        Errors: AssetError, SceneError.
         """
         if isinstance(texels, Volume):
             table = texels

@@ -83,18 +83,22 @@ def _about_back(theta_l: Array, x: Array, y: Array) -> Pair:
 
 
 def _halves(half: Float64, back: Float64) -> Pair:
-    """Returns l and v of the halves (N, 3) of their sum and of their difference l - v."""
+    """Returns l and v, given half their sum (N, 3) and half their difference l - v (N, 3)."""
     return half + back, half - back
 
 
 def _height(square: Array) -> Array:
-    """Returns the root of squares (N,); NaN for a negative one."""
+    """Returns the square roots of numbers (N,); the root of a negative number is NaN."""
     return np.sqrt(np.where(square >= 0, square, np.nan))
 
 
 def _stark(h: Array, b: Array, phi: Array) -> Pair:
-    """Returns l and v of the length h of the projected half sum, the length b of the half difference, and their azimuths'
-    difference (Stark et al. 2005, as ALTA has it)."""
+    """Returns l and v in the parametrisation of Stark et al. 2005, as ALTA defines it.
+
+    h: the length of the projected half sum.
+    b: the length of the half difference.
+    phi: the difference of their azimuths [rad].
+    """
     height = _height(1 - h * h - b * b)
     # The half difference is perpendicular to the half sum (h, 0, height).
     slope = np.arctan2(height, -h * np.cos(phi))

@@ -28,12 +28,14 @@ SCATTERED_SIZE = (60, 360, 90)
 # The splines are evaluated in each of the first DENSE rows of theta_d and in every COARSE_D-th row beyond; between these the
 # table is linear. A spline costs much more than a cell.
 DENSE, COARSE_D = 24, 12
-# The rounds of the solver that takes the table through the samples. After them the error at most samples is below 0.1 %.
+# The number of iterations of the solver that makes the table pass through the samples. After these, the table is within 0.1 %
+# of most samples.
 ROUNDS = 20
 
 
 # A surface has a grain where more than a tenth of the samples differ by more than this share from samples whose light comes
-# from other azimuths but which are alike otherwise. Most samples lie outside of the highlight and do not tell.
+# from other azimuths but which are alike otherwise. The share is small, because most samples lie outside of the highlight,
+# where a grain cannot be seen.
 GRAIN = 0.25
 # Samples are alike where their places (glshade/measured/scattered.py) differ by less than this [rad].
 ALIKE = 0.02

@@ -33,7 +33,7 @@ ILLUMINANTS = ("A", "D65", "F2", "F11")
 LARGEST_SPECTRUM, MOST_ROWS = 4 << 20, 100_000
 # A light whose luminance is a smaller share than this of the luminance of D65 with the same power counts as invisible.
 INVISIBLE = 1e-3
-# The digits after the point of a colour that is computed from a spectrum. Rounding to them makes greys exactly grey.
+# Colours that are computed from spectra are rounded to this number of decimal places, so that greys are exactly grey.
 DIGITS = 12
 # The temperatures of blackbodies [K]: at 500 K a body begins to glow, and the colour no longer changes far above 1e5 K.
 COLDEST, HOTTEST = 500.0, 1e6

@@ -172,7 +172,12 @@ class Stored:
 
     @classmethod
     def of(cls, pixels: Array, form: Format, swizzle: str) -> Stored:
-        """Returns a picture with its mipmaps. pixels: the picture's own numbers (H, W, C): 8-bit codes, or float32."""
+        """Returns a picture with its mipmaps.
+
+        pixels: the picture (H, W, C), as 8-bit codes or as float32 numbers.
+        form: the format in which it is stored.
+        swizzle: as in `Stored`.
+        """
         return cls(form, swizzle, (form.stored(pixels), *_smaller(pixels, form)))
 
     def decoded(self) -> Iterator[Pixels]:

@@ -14,7 +14,8 @@ os.environ.setdefault("VTK_DEFAULT_OPENGL_WINDOW", "vtkEGLRenderWindow")
 import vtk as vtk
 from vtk.util import numpy_support
 
-from glshade.bench.stage import AMBIENT, EXPONENT, EYE, FAR, FOV, KD, KS, NEAR, TO_LIGHT
+from glshade.bench.peers.vtk import coat
+from glshade.bench.stage import EYE, FAR, FOV, NEAR, TO_LIGHT
 
 
 class Body:
@@ -45,18 +46,6 @@ class Body:
         self._positions = positions
         points.SetData(numpy_support.numpy_to_vtk(positions))
         self._data.SetPoints(points)
-
-
-def coat(look: Any) -> None:
-    """Gives an actor's property the material of all works."""
-    look.SetInterpolationToPhong()
-    look.BackfaceCullingOn()
-    look.SetColor(*KD)
-    look.SetAmbient(AMBIENT)
-    look.SetDiffuse(1.0)
-    look.SetSpecular(KS)
-    look.SetSpecularColor(1, 1, 1)
-    look.SetSpecularPower(EXPONENT)
 
 
 class Window:

@@ -85,7 +85,8 @@ class Vtk:
         return None
 
     def draw(self, prepared: Any) -> Array:
-        from glshade.bench.life._vtk import Window, coat, vtk
+        from glshade.bench.life._vtk import Window, vtk
+        from glshade.bench.peers.vtk import coat
 
         reader, mapper, actor = vtk.vtkOBJReader(), vtk.vtkPolyDataMapper(), vtk.vtkActor()
         reader.SetFileName(str(self._path))

@@ -17,6 +17,18 @@ from vtk.util import numpy_support
 from glshade.bench.stage import AMBIENT, COLOURS, EXPONENT, EYE, FAR, FOV, KD, KS, NEAR, POSITIONS, TO_LIGHT, WorkFiles
 
 
+def coat(look: Any) -> None:
+    """Gives an actor's property the material of all works."""
+    look.SetInterpolationToPhong()
+    look.BackfaceCullingOn()
+    look.SetColor(*KD)
+    look.SetAmbient(AMBIENT)
+    look.SetDiffuse(1.0)
+    look.SetSpecular(KS)
+    look.SetSpecularColor(1, 1, 1)
+    look.SetSpecularPower(EXPONENT)
+
+
 class Peer:
     """Draws with a vtkRenderWindow, with back faces culled and without multisampling."""
 
@@ -59,15 +71,7 @@ class Peer:
         mapper, actor = vtk.vtkPolyDataMapper(), vtk.vtkActor()
         mapper.SetInputData(data)
         actor.SetMapper(mapper)
-        look = actor.GetProperty()
-        look.SetInterpolationToPhong()
-        look.BackfaceCullingOn()
-        look.SetColor(*KD)
-        look.SetAmbient(AMBIENT)
-        look.SetDiffuse(1.0)
-        look.SetSpecular(KS)
-        look.SetSpecularColor(1, 1, 1)
-        look.SetSpecularPower(EXPONENT)
+        coat(actor.GetProperty())
         return actor
 
     def _render(self, eye: tuple[float, float, float]) -> None:

@@ -97,7 +97,7 @@ def test_models_with_a_constant_part_are_exact_too() -> None:
 
 
 def banded(light: Any, bands: int) -> float:
-    """Returns the largest difference of a metal under a light from the sum over the wavelengths, by its ambient reflectance."""
+    """Returns the largest error of the light that a metal reflects of a sky, drawn in bands, against a sum over wavelengths."""
     metal = {"brdf": "metal", "eta": ETA, "k": K}
     found = scene(metal, 1, bands=bands)
     sky = found.model_copy(
